@@ -1,0 +1,36 @@
+"""Experiments and the search over them: tasks, cost, episodes, the journal, and the study that ties them together."""
+
+from ._assess import Verdict, assess
+from ._cost import Cost, Score
+from ._episode import Episode, fly
+from ._journal import Flight, Journal, JournalError, Trial
+from ._probe import probe
+from ._progress import Progress, clock, print_progress, progress_line
+from ._result import Result, RunError
+from ._study import Study
+from ._task import Circle, Origin, Pulse, Task
+
+__all__ = [
+    "Circle",
+    "Cost",
+    "Episode",
+    "Flight",
+    "Journal",
+    "JournalError",
+    "Origin",
+    "Progress",
+    "Pulse",
+    "Result",
+    "RunError",
+    "Score",
+    "Study",
+    "Task",
+    "Trial",
+    "Verdict",
+    "assess",
+    "clock",
+    "fly",
+    "print_progress",
+    "probe",
+    "progress_line",
+]

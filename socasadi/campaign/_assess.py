@@ -1,0 +1,123 @@
+"""What the found theta is worth: as a controller without the luck of its trial, and as a model."""
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import identify, prediction_error
+from ..mpc import DesignError
+from ._campaign import fly_once
+from ._episode import Episode
+from ._journal import Flight, Journal
+from ._probe import probe
+from ._result import Result, journal_path
+
+# Streams of random numbers beside the trials' own, which is 0.
+_VERIFICATION, _PROBE = 1, 2
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """One theta under fresh noise, and as a model.
+
+    Attributes
+    ----------
+    theta
+        (size,).
+    J, rmse
+        (verifications,) of the flights that did not fail; rmse in m.
+    failed
+        Number of flights that did.
+    prediction_error
+        Open-loop root mean square distance on a probing record that it was not fitted to, m.
+    """
+
+    theta: np.ndarray
+    J: np.ndarray
+    rmse: np.ndarray
+    failed: int
+    prediction_error: float
+
+
+def assess(
+    result: Result, rivals: Mapping[str, np.ndarray] | None = None, notify: Callable[[str], None] = lambda _: None
+) -> dict[str, Verdict]:
+    """Fly the best theta, ``rivals`` and an identified theta under the same fresh noise, and compare them as models.
+
+    Experiments: two probing records (one to identify from, one to judge all on) and ``study.verifications`` flights of
+    each theta. They are stored in the journal as they happen, so that none is flown twice.
+
+    Parameters
+    ----------
+    rivals
+        Further thetas by name.
+    notify
+        Is told what is being done.
+
+    Returns
+    -------
+    dict
+        Verdicts by name: ``"best"``, the rivals, ``"identified"``. Empty when the study asks for no verifications.
+    """
+    study = result.study
+    if study.verifications == 0:
+        return {}
+    with Journal(journal_path(result.folder), writer=True) as journal:
+        notify("probing the plant")
+        fitted, judged = (_probing(result, journal, index) for index in (1, 2))
+        notify("identifying a model")
+        thetas = {"best": result.best.theta, **(rivals or {}), "identified": identify(study.mpc.model, fitted.record)}
+        verdicts = {}
+        for name, theta in thetas.items():
+            notify(f"flying {name} {study.verifications} times")
+            flights = [_verification(result, journal, name, i, theta) for i in range(1, study.verifications + 1)]
+            scores = [flight.score for flight in flights if flight is not None and flight.score is not None]
+            verdicts[name] = Verdict(
+                theta,
+                J=np.array([score.J for score in scores]),
+                rmse=np.array([score.rmse for score in scores]),
+                failed=study.verifications - len(scores),
+                prediction_error=prediction_error(study.mpc.model, theta, judged.record),
+            )
+    return verdicts
+
+
+def _probing(result: Result, journal: Journal, index: int) -> Episode:
+    name = f"probe {index}"
+    if name not in (known := journal.flights()):
+        study = result.study
+        seed = int(np.random.SeedSequence([study.seed, _PROBE, index]).generate_state(1)[0])
+        record = probe(study.plant, study.mpc.input_bounds, seed=seed)
+        nothing = np.zeros_like(record.output)
+        episode = Episode(
+            sample_time=record.sample_time,
+            output=record.output,
+            reference=nothing,
+            truth=record.output,
+            tension=record.tension,
+            held=record.tension[0],
+            shapes=np.zeros((0, 0, 3)),
+        )
+        journal.add_flight(Flight(name, None, None, episode))
+        return episode
+    return known[name].episode
+
+
+def _verification(result: Result, journal: Journal, name: str, index: int, theta: np.ndarray) -> Flight | None:
+    """Flight ``index`` of ``theta``, flown unless the journal has it; None when theta gives no controller."""
+    study = result.study
+    # The hash keeps apart what goes by one name at different times, such as the best of a run that went on.
+    name = f"{name} {hashlib.sha256(theta.tobytes()).hexdigest()[:8]} {index}"
+    if (known := journal.flights().get(name)) is not None:
+        return known
+    try:
+        controller = study.mpc.controller(theta)
+    except DesignError:
+        return None
+    episode = fly_once(study, controller, stream=(_VERIFICATION, index))
+    score = study.cost.score(episode, study.mpc.input_scale) if episode.failure is None else None
+    flight = Flight(name, theta, score, episode)
+    journal.add_flight(flight)
+    return flight

@@ -1,0 +1,133 @@
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import Record
+from ..mpc import Controller
+from ..plant import Plant
+from ._task import Task
+
+_SHAPE_POINTS = 21
+_SHAPE_EVERY = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """What one flight of a controller gave, up to its end or its failure.
+
+    Attributes
+    ----------
+    sample_time
+        s.
+    output, reference, truth
+        (T + 1, p) m, measured, wanted and true outputs at t = 0, 1, ... T samples. A plant that does not know its
+        true outputs has the measured ones in their place.
+    tension
+        (T, m) N; row t was held from sample t to t + 1.
+    held
+        (m,) N, the tensions before the first sample.
+    shapes
+        (k, points, 3) m, the rod every fourth sample; empty when the plant does not know its shape.
+    fallbacks
+        Samples in which the controller could not apply its QP's answer.
+    failure
+        Why the episode ended early, None when it did not.
+    """
+
+    sample_time: float
+    output: np.ndarray
+    reference: np.ndarray
+    truth: np.ndarray
+    tension: np.ndarray
+    held: np.ndarray
+    shapes: np.ndarray
+    fallbacks: int = 0
+    failure: str | None = None
+
+    @property
+    def time(self) -> np.ndarray:
+        """Instants of the outputs (T + 1,), s."""
+        return self.sample_time * np.arange(len(self.output))
+
+    @property
+    def record(self) -> Record:
+        """Tensions and measured outputs, for identification."""
+        return Record(self.sample_time, self.tension, self.output)
+
+
+def fly(plant: Plant, controller: Controller, task: Task, *, seed: int, time_limit: float) -> Episode:
+    """Run ``controller`` against ``plant`` along the task's reference.
+
+    What the plant raises ends the episode and is its ``failure``, as is an episode that takes longer than ``time_limit``
+    s of wall time; the samples until then are kept.
+
+    Raises
+    ------
+    ValueError
+        The controller and the plant do not fit each other.
+    """
+    mpc = controller.mpc
+    samples, preview = task.samples(mpc.sample_time), np.arange(1, mpc.horizon + 1)
+    flight = _Flight(plant, mpc.sample_time, task)
+    deadline = time.monotonic() + time_limit
+    try:
+        if task.start is None:
+            y = plant.reset(seed=seed, tension_bounds=mpc.input_bounds)
+        else:
+            y = plant.reset(tip=task.start, seed=seed, tension_bounds=mpc.input_bounds)
+        flight.begin(y)
+        controller.reset(plant.tension)
+        for t in range(samples):
+            if time.monotonic() > deadline:
+                raise TimeoutError(f"took longer than its limit of {time_limit:g} s")
+            u = controller.step(y, task.reference((t + preview) * mpc.sample_time))
+            if task.pulse is None:
+                y = plant.step(u)
+            else:
+                y = plant.step(u, tip_force=task.pulse.at(t * mpc.sample_time))
+            flight.note(u, y)
+    except Exception as error:  # whatever a plant raises is a result of the experiment
+        return flight.end(controller.info.fallbacks, failure=f"{type(error).__name__}: {error}")
+    return flight.end(controller.info.fallbacks)
+
+
+class _Flight:
+    """Collects an episode while it happens."""
+
+    def __init__(self, plant: Plant, sample_time: float, task: Task) -> None:
+        self.plant, self.sample_time, self.task = plant, sample_time, task
+        self.output: list[np.ndarray] = []
+        self.truth: list[np.ndarray] = []
+        self.tension: list[np.ndarray] = []
+        self.shapes: list[np.ndarray] = []
+        self.held = np.zeros(plant.inputs)
+
+    def begin(self, y: np.ndarray) -> None:
+        self.held = np.array(self.plant.tension, dtype=float)
+        self._see(y)
+
+    def note(self, u: np.ndarray, y: np.ndarray) -> None:
+        self.tension.append(u)
+        self._see(y)
+
+    def _see(self, y: np.ndarray) -> None:
+        if len(self.output) % _SHAPE_EVERY == 0 and (shape := getattr(self.plant, "shape", None)):
+            self.shapes.append(shape(_SHAPE_POINTS))
+        self.truth.append(getattr(self.plant, "true_output", y))
+        self.output.append(y)
+
+    def end(self, fallbacks: int, failure: str | None = None) -> Episode:
+        p, m = self.plant.outputs, self.plant.inputs
+        instants = self.sample_time * np.arange(len(self.output))
+        return Episode(
+            sample_time=self.sample_time,
+            output=np.reshape(self.output, (-1, p)),
+            reference=self.task.reference(instants).reshape(-1, p),
+            truth=np.reshape(self.truth, (-1, p)),
+            tension=np.reshape(self.tension, (-1, m)),
+            held=self.held,
+            shapes=np.reshape(self.shapes, (-1, _SHAPE_POINTS, 3)).astype(np.float32),
+            fallbacks=fallbacks,
+            failure=failure,
+        )

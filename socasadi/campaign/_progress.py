@@ -1,0 +1,64 @@
+import time
+from dataclasses import dataclass
+
+from ._journal import Trial
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run stands after a trial.
+
+    Attributes
+    ----------
+    trial, best
+        The trial just stored, and the best so far (None while all have failed).
+    done, total
+        Numbers of trials.
+    elapsed, remaining
+        s of wall time in this session, and to the end at the pace of the last trials.
+    """
+
+    trial: Trial
+    best: Trial | None
+    done: int
+    total: int
+    elapsed: float
+    remaining: float
+
+
+class Clock:
+    """Estimates the time left from the last few trials, since asking grows dearer along the way."""
+
+    def __init__(self) -> None:
+        self.start = time.monotonic()
+        self._ends = [self.start]
+
+    def tick(self, left: int) -> tuple[float, float]:
+        """Time elapsed, and remaining for ``left`` more trials, s."""
+        self._ends = [*self._ends[-10:], time.monotonic()]
+        pace = (self._ends[-1] - self._ends[0]) / (len(self._ends) - 1)
+        return self._ends[-1] - self.start, pace * left
+
+
+def print_progress(progress: Progress) -> None:
+    """One line a trial on standard output."""
+    print(progress_line(progress), flush=True)
+
+
+def progress_line(progress: Progress) -> str:
+    """The line: trial, its J, the best J, time elapsed and remaining."""
+    trial, best = progress.trial, progress.best
+    outcome = f"J {trial.J:12.5g}" if trial.J is not None else f"{'failed':>14}"
+    incumbent = f"best {best.J:10.5g} (trial {best.number})" if best is not None else "no success yet"
+    width = len(str(progress.total))
+    return (
+        f"trial {trial.number:{width}}/{progress.total}  {outcome}  {incumbent}  "
+        f"{clock(progress.elapsed)} elapsed, {clock(progress.remaining)} left"
+    )
+
+
+def clock(seconds: float) -> str:
+    """Minutes and seconds, with hours when there are any."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"

@@ -1,0 +1,67 @@
+"""Objects to plain data and back, so that a run folder says, and can rebuild, what was run."""
+
+import dataclasses
+import importlib
+import inspect
+from typing import Any
+
+import numpy as np
+
+
+def describe(value: Any) -> Any:
+    """``value`` as JSON data: numbers, text, lists, and for an object its type with what it was constructed from.
+
+    An object is a dataclass, or one whose constructor arguments are attributes of the same names.
+    """
+    match value:
+        case None | bool() | int() | float() | str():
+            return value
+        case np.generic() | np.ndarray():
+            return value.tolist()
+        case list() | tuple():
+            return [describe(item) for item in value]
+        case dict():
+            return {str(key): describe(item) for key, item in value.items()}
+    if dataclasses.is_dataclass(value):
+        names = [field.name for field in dataclasses.fields(value) if field.init]
+    else:
+        names = [name for name in inspect.signature(type(value)).parameters if hasattr(value, name)]
+    return {"type": _public_name(type(value)), **{name: describe(getattr(value, name)) for name in names}}
+
+
+def rebuild(data: Any) -> Any:
+    """The object that :func:`describe` described; lists come back as tuples.
+
+    Raises
+    ------
+    ValueError
+        It holds a type that is not socasadi's own: only the study's script can make that.
+    """
+    if isinstance(data, list):
+        return tuple(rebuild(item) for item in data)
+    if not isinstance(data, dict):
+        return data
+    fields = {name: rebuild(item) for name, item in data.items() if name != "type"}
+    if "type" not in data:
+        return fields
+    module, _, name = data["type"].rpartition(".")
+    if module.split(".")[0] != "socasadi":
+        raise ValueError(f"the run uses {data['type']}, which only its study script can make; give the script")
+    return getattr(importlib.import_module(module), name)(**fields)
+
+
+def differences(old: Any, new: Any, path: str = "") -> list[str]:
+    """Where two descriptions differ, one line each."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        lines = []
+        for name in [*old, *(name for name in new if name not in old)]:
+            inner = f"{path}.{name}" if path else name
+            lines += differences(old.get(name), new.get(name), inner)
+        return lines
+    return [] if old == new else [f"{path} was {old} and is {new}"]
+
+
+def _public_name(kind: type) -> str:
+    """Where a user would import a type from: the first package above its private module."""
+    parts = [part for part in kind.__module__.split(".") if not part.startswith("_") or part == "__main__"]
+    return ".".join([*parts, kind.__qualname__])

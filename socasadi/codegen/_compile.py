@@ -1,0 +1,90 @@
+import functools
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+import casadi
+
+from ._cache import cached_file
+
+_FLAGS = ("-O2", "-fPIC", "-shared")
+
+
+class CompilationError(RuntimeError):
+    """The C compiler was found but did not accept generated code; the message carries what it said."""
+
+
+def c_compiler() -> str | None:
+    """Path of the C compiler: ``$CC`` when set, else the first of cc, gcc, clang on the PATH; None without one."""
+    chosen = os.environ.get("CC")
+    for name in [chosen] if chosen else ["cc", "gcc", "clang"]:
+        if path := shutil.which(name):
+            return path
+    return None
+
+
+def compiled(function: casadi.Function, *, flags: Sequence[str] = ()) -> casadi.Function:
+    """The same Function as machine code.
+
+    The C that CasADi generates for ``function`` is compiled to a shared library, which is kept in
+    :func:`cache_directory` under a hash of the C text, the compiler and the flags: a second call, in this process
+    or another, only loads it. Without a C compiler ``function`` itself is returned, and a warning says so once
+    for the process.
+
+    Parameters
+    ----------
+    function
+        Any Function for which CasADi generates C.
+    flags
+        Further compiler and linker flags: include folders, definitions, libraries.
+
+    Raises
+    ------
+    CompilationError
+        The compiler rejected the code.
+    """
+    compiler = c_compiler()
+    if compiler is None:
+        _warn_interpreted()
+        return function
+    source = c_source(function)
+    parts = (source, _compiler_identity(compiler), platform.machine(), *_FLAGS, *flags)
+    digest = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+    name = f"{function.name()}-{digest}.so"
+
+    def build(folder: Path) -> None:
+        (folder / "function.c").write_text(source)
+        command = [compiler, *_FLAGS, "function.c", "-o", name, *flags, "-lm"]
+        run = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+        if run.returncode:
+            raise CompilationError(
+                f"{' '.join(command)} failed on the C of {function.name()!r}:\n{run.stderr.strip()[:2000]}"
+            )
+
+    return casadi.external(function.name(), str(cached_file(name, build)))
+
+
+def c_source(function: casadi.Function, *, header: bool = False) -> str:
+    """C99 text of ``function``, as CasADi generates it, for callers that keep the text themselves."""
+    generator = casadi.CodeGenerator(f"{function.name()}.c", {"with_header": header})
+    generator.add(function)
+    return generator.dump()
+
+
+@functools.cache
+def _compiler_identity(compiler: str) -> str:
+    return subprocess.run([compiler, "--version"], capture_output=True, text=True).stdout
+
+
+@functools.cache
+def _warn_interpreted() -> None:
+    warnings.warn(
+        "no C compiler found (set CC, or install gcc): models run interpreted, more slowly but with the same results",
+        RuntimeWarning,
+        stacklevel=3,
+    )

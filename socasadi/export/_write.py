@@ -1,0 +1,151 @@
+import dataclasses
+import importlib.metadata
+import platform
+import shutil
+import subprocess
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+
+import casadi
+import jinja2
+import numpy as np
+
+from ..codegen import c_compiler
+from ..mpc import control_law
+from ._record import ControllerRecord
+
+TOLERANCE = 1e-4
+"""Largest difference between a tension of the exported C and Python's that the replay allows, N: OSQP stops
+iterating at a residual, so that its answers are good to about 1e-6 of the input bound."""
+
+
+class ExportError(RuntimeError):
+    """A controller that cannot be exported as asked, or whose C does not agree with Python."""
+
+
+def export(record: ControllerRecord, folder: str | Path, *, real: str = "double", solver: str = "osqp") -> Path:
+    """Write ``record`` as a folder of C: controller, data, QP solver, Makefile, and an episode to replay.
+
+    Parameters
+    ----------
+    folder
+        Made when it is not there; files of an earlier export in it are replaced.
+    real, solver
+        ``"double"`` and ``"osqp"``.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    ExportError
+        Another ``real`` or ``solver`` is asked for, or the folder holds something else.
+    """
+    if real != "double":
+        raise ExportError(f"real={real!r} cannot be exported yet: OSQP is used in double precision; use real='double'")
+    if solver != "osqp":
+        raise ExportError(f"solver={solver!r} cannot be exported yet; use solver='osqp'")
+    folder = Path(folder)
+    if folder.exists() and any(folder.iterdir()) and not (folder / "controller_data.h").exists():
+        raise ExportError(f"{folder} holds something that is no exported controller; choose another folder")
+    (folder / "osqp").mkdir(parents=True, exist_ok=True)
+    mpc = dataclasses.replace(record.mpc, backend="osqp")
+    design = mpc.design(record.system)
+
+    laws = casadi.CodeGenerator("law.c", {"with_header": True})
+    qp_law, plain_law = control_law(mpc, design), control_law(mpc, design, with_qp=False)
+    laws.add(qp_law)
+    laws.add(plain_law)
+    laws.generate(f"{folder}/")
+    for source in files(__package__).joinpath("c").iterdir():
+        (folder / source.name).write_text(source.read_text())
+    version = _copy_osqp(folder / "osqp")
+
+    facts = {
+        "title": "Model predictive controller tuned by socasadi",
+        "provenance": [*record.provenance, *_versions()],
+        "sample_time": mpc.sample_time,
+        "outputs": mpc.outputs,
+        "inputs": mpc.inputs,
+        "horizon": mpc.horizon,
+        "order": len(design.A),
+        "scale": mpc.input_scale,
+        "rest": design.rest,
+        "input_bounds": mpc.input_bounds,
+        "samples": len(record.output),
+        "tolerance": TOLERANCE,
+        "held": record.held,
+        "output": record.output,
+        "preview": record.preview.reshape(len(record.output), -1),
+        "tension": expected_tensions(record),
+        "osqp_version": version,
+        "machine": f"{platform.system()} on {platform.machine()}",
+        "stack": f"{8 * (qp_law.sz_w() + plain_law.sz_w()) / 1024:.0f}",
+    }
+    for name in ("controller_data.h", "episode.h", "README.md"):
+        (folder / name).write_text(_template(name).render(facts))
+    return folder
+
+
+def expected_tensions(record: ControllerRecord) -> np.ndarray:
+    """What the interpreted controller answers to the recorded episode, (T, m) N."""
+    controller = record.mpc.controller_for(record.system)
+    controller.reset(record.held)
+    return np.array([controller.step(y, rows) for y, rows in zip(record.output, record.preview, strict=True)])
+
+
+def build_and_replay(folder: str | Path) -> str:
+    """Run ``make test`` in an exported folder and return what the replay printed.
+
+    Raises
+    ------
+    ExportError
+        There is no C compiler or no make, or the build or the comparison failed; with what was said.
+    """
+    compiler = c_compiler()
+    if compiler is None or shutil.which("make") is None:
+        missing = "C compiler" if compiler is None else "make"
+        raise ExportError(f"the exported controller was not built: no {missing} found; run 'make test' in {folder} where there is one")
+    run = subprocess.run(
+        ["make", "-s", f"CC={compiler}", "test"], cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL
+    )
+    if run.returncode:
+        raise ExportError(f"'make test' failed in {folder}:\n{(run.stderr + run.stdout).strip()[-2000:]}")
+    return run.stdout.strip()
+
+
+def _copy_osqp(folder: Path) -> str:
+    """Headers and static library of OSQP, as the casadi package holds them; returns OSQP's version."""
+    package = Path(casadi.__file__).parent
+    library, headers = package / "libosqpstatic.a", package / "include" / "osqp"
+    if not library.exists() or not headers.is_dir():
+        raise ExportError(f"this build of casadi has no static OSQP library in {package}; install casadi from PyPI")
+    shutil.copy(library, folder)
+    shutil.copytree(headers, folder / "include" / "osqp", dirs_exist_ok=True)
+    text = (headers / "osqp_api_constants.h").read_text()
+    marked = [line.split('"')[1] for line in text.splitlines() if "OSQP_VERSION" in line and line.count('"') == 2]
+    return marked[0] if marked else ""
+
+
+def _versions() -> list[str]:
+    names = ("socasadi", "casadi")
+    return ["made with " + ", ".join(f"{name} {importlib.metadata.version(name)}" for name in names)]
+
+
+def _template(name: str) -> jinja2.Template:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("socasadi.export"), keep_trailing_newline=True, undefined=jinja2.StrictUndefined
+    )
+    environment.filters["c"] = _initialiser
+    return environment.get_template(name)
+
+
+def _initialiser(array: Sequence | np.ndarray) -> str:
+    """A C initialiser that reads back as the very same doubles."""
+    values = np.asarray(array, dtype=float)
+    if values.ndim == 1:
+        return "{" + ", ".join(repr(float(value)) for value in values) + "}"
+    return "{\n    " + ",\n    ".join(_initialiser(row) for row in values) + "}"

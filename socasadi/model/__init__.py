@@ -1,0 +1,20 @@
+"""Prediction-model families theta <-> (A, B, C, D), their bounds, and identification from records."""
+
+from ._base import PredictionModel, StateSpace
+from ._dense import Dense
+from ._entry import Entry
+from ._identify import bounds_from_record, identify, prediction_error
+from ._modal import Modal
+from ._record import Record
+
+__all__ = [
+    "Dense",
+    "Entry",
+    "Modal",
+    "PredictionModel",
+    "Record",
+    "StateSpace",
+    "bounds_from_record",
+    "identify",
+    "prediction_error",
+]

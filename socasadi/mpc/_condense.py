@@ -1,0 +1,41 @@
+from typing import NamedTuple
+
+import casadi
+
+
+class Prediction(NamedTuple):
+    """Outputs and last state as linear maps of the first state and the inputs (see :func:`predict`)."""
+
+    output_free: casadi.MX
+    output_forced: casadi.MX
+    last_free: casadi.MX
+    last_forced: casadi.MX
+
+
+def predict(A: casadi.MX, B: casadi.MX, C: casadi.MX, D: casadi.MX, horizon: int) -> Prediction:
+    r"""The horizon's outputs without its states ("condensing").
+
+    With :math:`x_{k+1} = A x_k + B v_k` and :math:`y_{k+1} = C x_{k+1} + D v_k`, the stacks
+    :math:`Y = (y_1, ..., y_N)` and :math:`V = (v_0, ..., v_{N-1})` obey
+
+    .. math:: Y = \Phi x_0 + \Gamma V, \qquad x_N = A^N x_0 + \Lambda V,
+
+    where block row k of :math:`\Phi` is :math:`C A^k`, and block (k, j) of :math:`\Gamma` is
+    :math:`C A^{k-1-j} B` for j < k, plus D on the diagonal j = k - 1.
+    """
+    powers = [casadi.MX.eye(A.shape[0])]
+    for _ in range(horizon):
+        powers.append(A @ powers[-1])
+    forced = [power @ B for power in powers[:-1]]
+    markov = [C @ block for block in forced]
+    markov[0] += D
+    zero = casadi.MX(C.shape[0], B.shape[1])
+    rows = [
+        casadi.horzcat(*[markov[k - 1 - j] if j < k else zero for j in range(horizon)]) for k in range(1, horizon + 1)
+    ]
+    return Prediction(
+        output_free=casadi.vertcat(*[C @ power for power in powers[1:]]),
+        output_forced=casadi.vertcat(*rows),
+        last_free=powers[-1],
+        last_forced=casadi.horzcat(*reversed(forced)),
+    )

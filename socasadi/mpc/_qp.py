@@ -1,0 +1,102 @@
+"""The QP solvers by name, one behaviour, and the test that each of their answers has to pass."""
+
+import contextlib
+import ctypes
+import os
+import sys
+from collections.abc import Iterator
+
+import casadi
+
+KKT_TOLERANCE = 1e-6
+"""Largest KKT residual (see :func:`kkt_residual`) of an answer that is believed."""
+
+_OPTIONS: dict[str, dict] = {
+    "daqp": {},
+    "qpoases": {"printLevel": "none"},
+    "osqp": {
+        "warm_start_primal": False,
+        "warm_start_dual": False,
+        "osqp": {
+            "verbose": False,
+            "eps_abs": 1e-8,
+            "eps_rel": 1e-8,
+            "max_iter": 20_000,
+            "adaptive_rho_interval": 50,
+        },
+    },
+}
+
+BACKENDS = tuple(_OPTIONS)
+"""Names of the QP solvers, the quickest that is right first."""
+
+
+def check_backend(name: str) -> None:
+    """ValueError when no QP solver goes by that name."""
+    if name not in _OPTIONS:
+        raise ValueError(f"unknown QP back end {name!r}; there are {', '.join(BACKENDS)}")
+
+
+def qp_solver(name: str, variables: int, rows: int) -> casadi.Function:
+    """CasADi conic Function of a dense QP, min v'Hv/2 + g'v with bounds on v and on A v."""
+    check_backend(name)
+    pattern = {"h": casadi.Sparsity.dense(variables, variables), "a": casadi.Sparsity.dense(rows, variables)}
+    with quiet(name == "qpoases"):
+        return casadi.conic("qp", name, pattern, {**_OPTIONS[name], "error_on_fail": False})
+
+
+def kkt_residual(
+    H: casadi.MX,
+    g: casadi.MX,
+    A: casadi.MX,
+    upper_rows: casadi.MX,
+    lower: casadi.DM,
+    upper: casadi.DM,
+    v: casadi.MX,
+    multipliers: casadi.MX,
+    row_multipliers: casadi.MX,
+) -> casadi.MX:
+    """Largest violation of the optimality conditions of min v'Hv/2 + g'v, lower <= v <= upper, A v <= upper_rows.
+
+    Stationarity (relative to 1 + max |g|), feasibility, signs of the multipliers and complementarity; NaN when the
+    answer holds one. Multipliers are positive at an upper bound, negative at a lower one; ``upper`` may be infinite.
+    """
+    stationarity = H @ v + g + A.T @ row_multipliers + multipliers
+    slack_rows = upper_rows - A @ v
+    at_upper, at_lower = casadi.fmax(multipliers, 0), casadi.fmax(-multipliers, 0)
+    bounded = [i for i, value in enumerate(upper.full().ravel()) if value < float("inf")]
+    open_above = [i for i in range(v.shape[0]) if i not in bounded]
+    parts = [
+        casadi.fabs(stationarity) / (1 + casadi.norm_inf(g)),
+        -slack_rows,
+        -row_multipliers,
+        casadi.fabs(row_multipliers * slack_rows),
+        lower - v,
+        at_lower * (v - lower),
+        (v - upper)[bounded],
+        (at_upper * (upper - v))[bounded],
+        at_upper[open_above],
+    ]
+    # The sum keeps a NaN that mmax, by comparisons, would drop.
+    everything = casadi.vertcat(*parts)
+    return casadi.mmax(everything) + 0 * casadi.sum1(everything)
+
+
+@contextlib.contextmanager
+def quiet(active: bool) -> Iterator[None]:
+    """Standard output of C code goes nowhere: qpOASES prints its licence from below Python whatever its print level."""
+    if not active:
+        yield
+        return
+    flush = ctypes.CDLL(None).fflush
+    sys.stdout.flush()
+    flush(None)
+    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        yield
+    finally:
+        flush(None)
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)

@@ -1,0 +1,27 @@
+import casadi
+
+_DOUBLINGS = 18
+
+
+def riccati(A: casadi.MX, B: casadi.MX, Q: casadi.MX, R: casadi.MX, S: casadi.MX | None = None) -> casadi.MX:
+    r"""Solution P of the discrete algebraic Riccati equation, as an expression in its coefficients.
+
+    .. math:: P = A'PA + Q - (A'PB + S)(B'PB + R)^{-1}(B'PA + S')
+
+    Structure-preserving doubling (Chu, Fan, Lin, Wang, "Structure-preserving algorithms for periodic discrete-time
+    algebraic Riccati equations", Int. J. Control 77, 2004): step k is the cost-to-go over :math:`2^k` samples from a zero
+    terminal cost, so that the limit is the smallest positive semidefinite solution. A fixed number of steps covers
+    2.6e5 samples. The expression is not checked here: where no solution exists the values grow, and the
+    design that uses them is refused for its residual (:mod:`._design`).
+    """
+    if S is not None:
+        A, Q = A - B @ casadi.solve(R, S.T), Q - S @ casadi.solve(R, S.T)
+    identity = casadi.DM.eye(A.shape[0])
+    G, H = B @ casadi.solve(R, B.T), Q
+    for _ in range(_DOUBLINGS):
+        # Both products with (I + G H)^-1 from one factorisation.
+        solved = casadi.solve(identity + G @ H, casadi.horzcat(A, G))
+        WA, WG = casadi.horzsplit(solved, [0, A.shape[0], 2 * A.shape[0]])
+        A, G, H = A @ WA, G + A @ WG @ A.T, H + A.T @ H @ WA
+        G, H = (G + G.T) / 2, (H + H.T) / 2
+    return H

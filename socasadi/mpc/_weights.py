@@ -1,0 +1,51 @@
+from collections.abc import Sequence
+from typing import Literal, get_args
+
+import numpy as np
+
+InputTerm = Literal["rate", "normalised", "literal"]
+"""What a weight R on the input weighs: the change of u/u_max from one sample to the next, u/u_max, or u in newtons."""
+
+Weight = float | Sequence[float] | Sequence[Sequence[float]]
+
+
+def weight_matrix(weight: Weight, size: int, name: str) -> np.ndarray:
+    """The positive semidefinite (size, size) matrix that a number, a diagonal or a whole matrix stands for."""
+    values = np.asarray(weight, dtype=float)
+    if values.ndim == 0:
+        matrix = values * np.eye(size)
+    elif values.shape == (size,):
+        matrix = np.diag(values)
+    elif values.shape == (size, size):
+        matrix = values
+    else:
+        raise ValueError(
+            f"{name} is a number, {size} numbers or a ({size}, {size}) matrix, not of shape {values.shape}"
+        )
+    if not np.isfinite(matrix).all() or np.abs(matrix - matrix.T).max() > 1e-12 * np.abs(matrix).max():
+        raise ValueError(f"{name} must be finite and symmetric, not {weight}")
+    if np.linalg.eigvalsh(matrix)[0] < -1e-12 * np.abs(matrix).max():
+        raise ValueError(f"{name} must be positive semidefinite, not {weight}")
+    return matrix
+
+
+def check_input_term(term: str) -> None:
+    """ValueError when no input term goes by that name."""
+    if term not in get_args(InputTerm):
+        raise ValueError(f"unknown input_term {term!r}; there are {', '.join(get_args(InputTerm))}")
+
+
+def bound_pair(bounds: tuple, size: int, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper bounds, each (size,), from a pair of numbers or of vectors; they must be finite and ascend."""
+    try:
+        lower, upper = (np.broadcast_to(np.asarray(side, dtype=float), (size,)).copy() for side in bounds)
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"{name} is a pair (lower, upper) of numbers or of {size} numbers each, not {bounds}"
+        ) from None
+    if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
+        raise ValueError(f"{name} must be finite, not {bounds}")
+    if (lower >= upper).any():
+        i = int(np.argmax(lower >= upper))
+        raise ValueError(f"{name} cross: lower {lower[i]:g} is not below upper {upper[i]:g}")
+    return lower, upper

@@ -1,0 +1,55 @@
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from ..campaign import Trial
+from ._style import BLACK, BLUE, COLUMN, GREY, MM, ORANGE, legend_above, page
+
+
+def convergence(trials: list[Trial], baseline: list[Trial] | None = None) -> Figure:
+    """Cost of each trial and the best so far; the baseline's best so far beside it."""
+    figure, (axes,) = page(COLUMN, 62 * MM)
+    axes.set_yscale("log")
+    for phase, label, marker, face in (("seed", "seed point", "s", "white"), ("search", "search", "o", BLUE)):
+        done = [(t.number, t.J) for t in trials if t.phase == phase and t.J is not None]
+        if done:
+            axes.plot(*np.transpose(done), marker, mfc=face, mec=BLUE, mew=0.7, label=label, zorder=3, clip_on=False)
+    failed = [t.number for t in trials if t.J is None]
+    if failed:
+        # Failures have no cost: they stand on the upper edge.
+        edge = axes.get_xaxis_transform()
+        axes.plot(failed, np.ones(len(failed)), "x", color=ORANGE, label="failed", transform=edge, clip_on=False)
+    incumbent = best_so_far(trials)
+    axes.step(np.arange(1, len(trials) + 1), incumbent, where="post", color=BLACK, lw=1.2, label="best so far")
+    if baseline:
+        steps = np.arange(1, len(baseline) + 1)
+        axes.step(steps, best_so_far(baseline), where="post", color=GREY, ls="--", lw=1.2, label="best of Sobol points")
+    if np.isfinite(incumbent).any():
+        best = int(np.nanargmin(incumbent))
+        axes.plot(best + 1, incumbent[best], "*", color=ORANGE, ms=9, mec="white", mew=0.5, zorder=5)
+        # Above and to the left, where the trials before were worse.
+        right = best > len(trials) / 2
+        axes.annotate(
+            f"{incumbent[best]:.3g}",
+            (best + 1, incumbent[best]),
+            xytext=(-4 if right else 4, -11),
+            textcoords="offset points",
+            ha="right" if right else "left",
+            color=ORANGE,
+        )
+    axes.yaxis.set_major_locator(LogLocator(numticks=8))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    low, high = axes.get_ylim()
+    axes.set_ylim(low / 1.5, high)
+    axes.set_xlim(0, max(len(trials), len(baseline or [])) + 1)
+    axes.set_xlabel("trial")
+    axes.set_ylabel("cost J")
+    legend_above(axes, 3)
+    return figure
+
+
+def best_so_far(trials: list[Trial]) -> np.ndarray:
+    """Least cost up to each trial; NaN while all have failed."""
+    costs = np.array([np.inf if trial.J is None else trial.J for trial in trials])
+    least = np.minimum.accumulate(costs) if len(costs) else costs
+    return np.where(np.isfinite(least), least, np.nan)

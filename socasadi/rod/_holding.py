@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+from scipy.optimize import least_squares
+
+from ._checks import vector
+from ._statics import Equilibrium, EquilibriumError, Statics
+
+if TYPE_CHECKING:
+    from ._rod import Rod
+
+_ITERATIONS = 40
+_REACHED = 1e-6  # of the length: a nearest pose that misses by less counts as reached
+_ZERO = np.zeros(3)
+
+
+class Holding:
+    """The tensions of least norm, within bounds, that hold the tip at a given (y, z).
+
+    A sequence of quadratic programs: the tip is linearised in the tensions about the static pose of the last ones,
+    min |u|^2 subject to that linearised tip being the target and u within the bounds. When such a program has no
+    solution, the nearest reachable pose decides whether the target is out of reach or the linearisation was.
+    """
+
+    def __init__(self, rod: Rod, statics: Statics, bounds: tuple[np.ndarray, np.ndarray]) -> None:
+        self._rod, self._statics = rod, statics
+        self._lower, self._upper = bounds
+
+    def at(self, tip: Sequence[float] | np.ndarray) -> Equilibrium:
+        """Equilibrium with its tip at ``tip`` = (y, z), m; EquilibriumError when there is none."""
+        target = vector("Rod.equilibrium_at", "tip", tip, 2)
+        if not self._rod.cables:
+            raise EquilibriumError("a rod without cables cannot hold its tip away from rest; give it cables")
+        rest = self._statics.solve(self._clip(np.zeros(len(self._rod.cables))), _ZERO, _ZERO)
+        held = self._least_norm(rest, target)
+        return held or self._least_norm(self._nearest(rest, target), target) or self._nearest(rest, target)
+
+    def _least_norm(self, latest: Equilibrium, target: np.ndarray) -> Equilibrium | None:
+        for _ in range(_ITERATIONS):
+            slope = self._statics.tip_sensitivity(latest)[1:]
+            tension = self._program(slope, slope @ latest.tension + target - latest.tip[1:])
+            if tension is None:
+                return None
+            change = float(np.abs(tension - latest.tension).max())
+            try:
+                latest = self._statics.solve(tension, _ZERO, _ZERO, latest.q)
+            except EquilibriumError:
+                return None
+            if change < 1e-9 * (1 + float(np.abs(tension).max())):
+                return latest
+        return None
+
+    def _program(self, slope: np.ndarray, value: np.ndarray) -> np.ndarray | None:
+        """argmin |u|^2 subject to ``slope`` u = ``value`` and the bounds, or None when there is no such u."""
+        # In units of the tension that the linearisation needs, so that the solver's tolerances fit.
+        unit = max(float(np.abs(np.linalg.pinv(slope) @ value).max()), 1e-6)
+        size = self._rod.length
+        solver, rows = _quadratic_program(len(self._rod.cables)), slope * unit / size
+        answer = solver(
+            h=ca.DM.eye(rows.shape[1]),
+            a=rows,
+            lba=value / size,
+            uba=value / size,
+            lbx=self._lower / unit,
+            ubx=self._upper / unit,
+        )
+        return self._clip(answer["x"].full()[:, 0] * unit) if solver.stats()["success"] else None
+
+    def _nearest(self, rest: Equilibrium, target: np.ndarray) -> Equilibrium:
+        """The reachable pose whose tip is nearest to ``target``; EquilibriumError when that is not there."""
+        latest, length = rest, self._rod.length
+
+        def at(tension: np.ndarray) -> Equilibrium:
+            nonlocal latest
+            if not np.array_equal(tension, latest.tension):
+                latest = self._statics.solve(tension, _ZERO, _ZERO, latest.q)
+            return latest
+
+        def miss(tension: np.ndarray) -> np.ndarray:
+            try:
+                return (at(tension).tip[1:] - target) / length
+            except EquilibriumError:
+                return np.full(2, 1e3)  # no pose there: a trial that the trust region takes back
+
+        def slope(tension: np.ndarray) -> np.ndarray:
+            return self._statics.tip_sensitivity(at(tension))[1:] / length
+
+        # The trust region keeps strictly inside bounds, so those of a fixed cable are set a hair apart.
+        upper = np.maximum(self._upper, self._lower + 1e-9)
+        margin = np.minimum(1e-3, 1e-3 * (upper - self._lower))
+        start = np.clip(rest.tension, self._lower + margin, upper - margin)
+        found = least_squares(
+            miss,
+            start,
+            jac=slope,  # type: ignore[arg-type]
+            bounds=(self._lower, upper),
+            xtol=1e-14,
+            ftol=1e-14,
+            gtol=1e-14,
+        )
+        nearest = at(found.x)
+        distance = float(np.linalg.norm(nearest.tip[1:] - target))
+        if distance > _REACHED * length:
+            y, z = nearest.tip[1:]
+            raise EquilibriumError(
+                f"the tip cannot be held at (y, z) = ({target[0]:g}, {target[1]:g}) m with tensions within the bounds: "
+                f"the nearest static pose has it at ({y:.5f}, {z:.5f}) m, {1e3 * distance:.3g} mm away"
+            )
+        return nearest
+
+    def _clip(self, tension: np.ndarray) -> np.ndarray:
+        return np.clip(tension, self._lower, self._upper)
+
+
+@cache
+def _quadratic_program(cables: int) -> ca.Function:
+    shapes = {"h": ca.Sparsity.dense(cables, cables), "a": ca.Sparsity.dense(2, cables)}
+    return ca.conic("least_norm", "daqp", shapes, {"error_on_fail": False})

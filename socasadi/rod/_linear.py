@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+from scipy.linalg import eigh, expm
+
+from ._checks import positive
+
+if TYPE_CHECKING:
+    from ._rod import Rod
+    from ._statics import Equilibrium
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """Deviations from an equilibrium: dx/dt = A x + B u (or x+ = A x + B u), y = C x + D u.
+
+    Attributes
+    ----------
+    A, B, C, D
+        Matrices (2 n, 2 n), (2 n, cables), (2, 2 n), (2, cables): state [q; v], tensions in N, tip (y, z) in m.
+    sample_time
+        s; None for continuous time.
+    equilibrium
+        Where the deviations start from.
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    sample_time: float | None
+    equilibrium: Equilibrium
+
+    def __iter__(self):
+        """A, B, C, D = linearisation"""
+        return iter((self.A, self.B, self.C, self.D))
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Small vibrations about an equilibrium, slowest first.
+
+    Attributes
+    ----------
+    frequency
+        Undamped natural frequencies (n,), Hz; 0 where the equilibrium is not stable.
+    damping_ratio
+        (n,); above 1 the mode is overdamped. Modal damping: the coupling between modes is left out.
+    shape
+        (n, n) mode shapes in the strain coordinates, one a column, of unit modal mass.
+    """
+
+    frequency: np.ndarray
+    damping_ratio: np.ndarray
+    shape: np.ndarray
+
+
+def linearise(rod: Rod, equilibrium: Equilibrium, sample_time: float | None) -> Linearisation:
+    n, m = rod.dof, len(rod.cables)
+    x, u, tip_force = ca.MX.sym("x", 2 * n), ca.MX.sym("u", m), ca.MX.sym("tip_force", 3)
+    xdot, tip = rod.model.forced_rhs(x, u, tip_force), rod.model.tip(x[:n])
+    jacobians = [ca.jacobian(xdot, x), ca.jacobian(xdot, u), ca.jacobian(tip[1:], x)]
+    evaluate = ca.Function("linear", [x, u, tip_force], jacobians)
+    A, B, C = (value.full() for value in evaluate(equilibrium.state, equilibrium.tension, equilibrium.tip_force))
+    if sample_time is not None:
+        positive("Rod.linearise", sample_time=sample_time)
+        both = expm(sample_time * np.block([[A, B], [np.zeros((m, 2 * n + m))]]))
+        A, B = both[: 2 * n, : 2 * n], both[: 2 * n, 2 * n :]
+    return Linearisation(A, B, C, np.zeros((2, m)), sample_time, equilibrium)
+
+
+def modes(rod: Rod, tangent: np.ndarray, q: np.ndarray) -> Modes:
+    """Modes of the conservative part of ``tangent`` stiffness with the mass matrix at ``q``."""
+    squared, shape = eigh((tangent + tangent.T) / 2, rod.mass(q).full())
+    omega = np.sqrt(np.maximum(squared, 0))
+    damping = np.einsum("ij,ik,kj->j", shape, rod.damping_matrix.full(), shape)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return Modes(omega / (2 * np.pi), damping / (2 * omega), shape)

@@ -1,0 +1,36 @@
+"""Bayesian optimisation of an expensive cost over a box: space, Gaussian process, acquisition, ask/tell.
+
+Knows nothing of robots. GPy gives the marginal likelihood; prediction and acquisition are in closed form.
+
+    space = Space([Parameter("frequency", "rad/s", 2, 10, "log"), Parameter("gain", "m/N", -0.012, 0.012)])
+    search = Optimizer(space, seed=1)
+    for _ in range(110):
+        theta = search.ask()
+        search.tell(theta, cost(theta))
+    search.best
+"""
+
+from ._acquisition import expected_improvement, log_expected_improvement
+from ._fit import FitSettings, fit
+from ._optimizer import Optimizer
+from ._posterior import Hyperparameters, Posterior
+from ._search import Search, Timings, Trial
+from ._sobol import SobolSearch
+from ._space import Parameter, ParameterLike, Space
+
+__all__ = [
+    "FitSettings",
+    "Hyperparameters",
+    "Optimizer",
+    "Parameter",
+    "ParameterLike",
+    "Posterior",
+    "Search",
+    "SobolSearch",
+    "Space",
+    "Timings",
+    "Trial",
+    "expected_improvement",
+    "fit",
+    "log_expected_improvement",
+]
