@@ -112,7 +112,7 @@ class Journal:
             raise JournalError(f"there is no journal at {path}")
         fresh = not path.exists()
         with self._reading():
-            self._database = sqlite3.connect(path if writer else f"{path.resolve().as_uri()}?mode=ro", uri=not writer)
+            self._database = sqlite3.connect(f"{path.resolve().as_uri()}?mode={'rwc' if writer else _read_mode(path)}", uri=True)
             if fresh:
                 self._database.executescript(
                     f"PRAGMA journal_mode=WAL; BEGIN; {_TABLES} INSERT INTO about VALUES ({SCHEMA}); COMMIT;"
@@ -210,6 +210,11 @@ class Journal:
                 yield
         except sqlite3.OperationalError as error:
             raise JournalError(f"{self.path} cannot be written ({error}); what was stored before is safe") from error
+
+
+def _read_mode(path: Path) -> str:
+    """A reader that may write tidies SQLite's side files away; on a medium that it may not, there are none."""
+    return "rw" if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK) else "ro&immutable=1"
 
 
 def _lock(path: Path) -> int:

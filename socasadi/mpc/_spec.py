@@ -74,8 +74,8 @@ class LinearMPC:
     terminal: Literal["riccati"] | None = "riccati"
     slack_weight: float = 1e5
     measurement_noise: float = 1e-3
-    input_noise: float = 0.3
-    disturbance_noise: float = 5e-4
+    input_noise: float = 0.5
+    disturbance_noise: float = 1e-3
     backend: str = BACKENDS[0]
 
     def __post_init__(self) -> None:

@@ -1,6 +1,6 @@
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from ..campaign import Trial
 from ._style import BLACK, BLUE, COLUMN, GREY, MM, ORANGE, legend_above, page
@@ -41,10 +41,11 @@ def convergence(trials: list[Trial], baseline: list[Trial] | None = None) -> Fig
     axes.yaxis.set_minor_formatter(NullFormatter())
     low, high = axes.get_ylim()
     axes.set_ylim(low / 1.5, high)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlim(0, max(len(trials), len(baseline or [])) + 1)
     axes.set_xlabel("trial")
     axes.set_ylabel("cost J")
-    legend_above(axes, 3)
+    legend_above(axes, 2)
     return figure
 
 

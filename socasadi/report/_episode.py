@@ -1,5 +1,6 @@
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ..campaign import Episode
 from ._style import (
@@ -78,7 +79,8 @@ def shapes(episode: Episode, instants: int = 6) -> Figure | None:
     """
     if not len(episode.shapes):
         return None
-    figure = Figure(figsize=(COLUMN, 92 * MM))
+    # Constrained layout does not know how far the labels of three dimensions reach.
+    figure = Figure(figsize=(COLUMN, 92 * MM), layout="none")
     axes = figure.add_subplot(projection="3d")
     chosen = np.unique(np.linspace(0, len(episode.shapes) - 1, instants).round().astype(int))
     every = (len(episode.output) - 1) / max(len(episode.shapes) - 1, 1)
@@ -96,10 +98,13 @@ def shapes(episode: Episode, instants: int = 6) -> Figure | None:
         axes.plot(wanted[:, 0], wanted[:, 1], height, color=BLACK, ls="--", lw=0.8, label="reference")
     side = max(1.15e3 * np.abs(episode.shapes[:, :, 1:]).max(), 0.1 * length)
     axes.set(xlim=(-side, side), ylim=(-side, side), zlim=(0, 1.02 * length))
-    axes.set_box_aspect((1, 1, 1.5))
+    axes.set_box_aspect((1, 1, 1.5), zoom=0.86)
     axes.set(xlabel="y / mm", ylabel="z / mm", zlabel="x / mm")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(5))
     axes.view_init(elev=18, azim=-55)
-    axes.legend(loc="upper left", bbox_to_anchor=(-0.12, 1.0), ncols=1)
+    figure.subplots_adjust(left=0.08, right=0.92, bottom=0.04, top=1.0)
+    figure.legend(loc="upper left", ncols=1)
     return figure
 
 

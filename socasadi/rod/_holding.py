@@ -38,7 +38,17 @@ class Holding:
             raise EquilibriumError("a rod without cables cannot hold its tip away from rest; give it cables")
         rest = self._statics.solve(self._clip(np.zeros(len(self._rod.cables))), _ZERO, _ZERO)
         held = self._least_norm(rest, target)
-        return held or self._least_norm(self._nearest(rest, target), target) or self._nearest(rest, target)
+        if held is None:
+            nearest = self._nearest(rest, target)
+            if np.count_nonzero(self._lower < self._upper) <= 2:
+                return nearest  # two coordinates held by two free cables leave nothing to choose
+            held = self._least_norm(nearest, target)
+        if held is None:
+            raise EquilibriumError(
+                f"the tip can be at (y, z) = ({target[0]:g}, {target[1]:g}) m, but the tensions of least norm that "
+                "hold it there were not found; tighter tension bounds may help"
+            )
+        return held
 
     def _least_norm(self, latest: Equilibrium, target: np.ndarray) -> Equilibrium | None:
         for _ in range(_ITERATIONS):

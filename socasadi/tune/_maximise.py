@@ -14,9 +14,9 @@ from ._posterior import Posterior
 # nothing, and contradicting values at one place upset the fit.
 SAME_POINT = 1e-4
 
-_SOBOL_LOG2 = 9
-_NEAR_EACH = 50
-_STARTS_EACH = 4
+_SOBOL_LOG2 = 10
+_NEAR_EACH = 100
+_STARTS_EACH = 8
 _ITERATIONS = 60
 
 

@@ -63,9 +63,9 @@ class Optimizer:
 
     Notes
     -----
-    A failed trial stands in the model as the worst cost seen plus half the range seen, on the transformed
-    scale, so that it steers the search away, as in Vizier (Song et al. 2024, arXiv 2408.11527); it is never
-    the best. While there are only failures the Sobol sequence goes on.
+    A failed trial stands in the model as the worst cost seen plus a tenth of the range seen, on the
+    transformed scale, so that it steers the search away, as in Vizier (Song et al. 2024, arXiv 2408.11527);
+    it is never the best. While there are only failures the Sobol sequence goes on.
     """
 
     def __init__(

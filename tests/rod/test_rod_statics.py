@@ -165,3 +165,20 @@ def test_gravity_is_replaced_in_a_copy():
     assert hung == Rod.preset("hanging")
     stretch = 1000 * 9.81 * 0.6**2 / (2 * 1e6)  # rho g L^2 / 2E: a column under its weight, mean strain constant
     assert hung.equilibrium().tip[0] - 0.6 == pytest.approx(stretch, rel=1e-12)
+
+
+@pytest.mark.parametrize("rod", [PAPER, Rod.preset("hanging")], ids=["paper", "hanging"])
+def test_whatever_tensions_reach_can_be_held_with_no_more_effort(rod):
+    random = np.random.default_rng(0)
+    for bounds in [(-np.inf, np.inf), (0, 10), (-10, 10)] * 3:
+        tension = random.uniform(max(bounds[0], -10), 10, size=3)
+        target = rod.equilibrium(tension).tip[1:]
+        held = rod.equilibrium_at(target, bounds)
+        assert np.allclose(held.tip[1:], target, rtol=0, atol=1e-9)
+        assert np.linalg.norm(held.tension) <= np.linalg.norm(tension) + 1e-9
+
+
+def test_a_fixed_cable_keeps_its_tension():
+    target = PAPER.equilibrium([3.0, 1.0, -2.0]).tip[1:]
+    held = PAPER.equilibrium_at(target, ([-10, 1, -10], [10, 1, 10]))
+    assert np.allclose(held.tension, [3, 1, -2], atol=1e-7)

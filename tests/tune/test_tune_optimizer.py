@@ -176,9 +176,7 @@ def test_while_all_trials_fail_it_keeps_exploring():
     search = run(Optimizer(space, seed=0, seed_points=4), sphere, 12, fails=lambda theta: True)
     sobol = run(SobolSearch(space, seed=0), sphere, 12)
     assert search.best is None
-    np.testing.assert_array_equal(
-        [trial.theta for trial in search.trials], [trial.theta for trial in sobol.trials]
-    )
+    np.testing.assert_array_equal([trial.theta for trial in search.trials], [trial.theta for trial in sobol.trials])
     search.tell([0.3, 0.3], 0.1)
     asked = search.ask()
     assert np.abs([trial.theta - asked for trial in search.trials]).max(axis=1).min() > 1e-4
@@ -254,7 +252,7 @@ def test_a_telling_that_makes_no_sense_is_refused_and_not_recorded(search, told,
 
 def test_a_cost_that_has_no_logarithm_is_refused():
     search = Optimizer(cube(1))
-    with pytest.raises(ValueError, match='the cost is 0.0 and log J is modelled: use transform="none"'):
+    with pytest.raises(ValueError, match=r'the cost is 0\.0 and log J is modelled: use transform="none"'):
         search.tell([0.5], 0.0)
     assert search.trials == ()
     Optimizer(cube(1), transform="none").tell([0.5], -3.0)

@@ -1,0 +1,242 @@
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+
+from socasadi import Circle, LinearMPC, Modal, Study
+from socasadi.campaign import Journal, JournalError, Result, RunError, assess
+from socasadi.plant import PlantFailure
+
+
+def points(result):
+    return np.array([trial.theta for trial in result.trials])
+
+
+class TestContinuation:
+    def test_a_run_that_was_stopped_asks_the_same_points_as_one_that_ran_through(self, toy_study, tmp_path):
+        whole = toy_study.run(tmp_path / "whole", progress=None)
+        replace(toy_study, iterations=2).run(tmp_path / "parts", progress=None)
+        parts = toy_study.run(tmp_path / "parts", resume=True, progress=None)
+        np.testing.assert_array_equal(points(parts), points(whole))
+        assert [trial.J for trial in parts.trials] == [trial.J for trial in whole.trials]
+
+    def test_an_interrupt_in_the_middle_of_a_trial_loses_no_finished_one(self, toy_study, tmp_path):
+        def stop_at_eight(progress):
+            if progress.done == 8:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            toy_study.run(tmp_path / "run", progress=stop_at_eight)
+        with Journal(tmp_path / "run" / "journal.sqlite") as journal:
+            assert len(journal.trials()) == 8
+        assert len(toy_study.run(tmp_path / "run", resume=True, progress=None).trials) == 12
+
+    def test_sigkill_at_several_moments_loses_no_stored_trial_and_changes_no_later_one(self, tmp_path):
+        script = tmp_path / "study.py"
+        script.write_text(
+            "import sys; sys.path.insert(0, sys.argv[2])\n"
+            "from conftest import ToyPlant, ShortCircle\n"
+            "from socasadi import *\n"
+            "study = Study(plant=ToyPlant(), mpc=LinearMPC(Modal()), task=ShortCircle(), seed_points=40, iterations=0)\n"
+            "study.run(sys.argv[1], resume=True)\n"
+        )
+
+        def start(folder):
+            command = [sys.executable, str(script), str(folder), os.path.dirname(os.path.dirname(__file__))]
+            return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+        kept = 0
+        for lines_before_the_kill in (1, 7, 4):
+            process = start(tmp_path / "killed")
+            seen = [process.stdout.readline() for _ in range(lines_before_the_kill)]
+            process.send_signal(signal.SIGKILL)
+            process.communicate()
+            assert seen[-1].startswith("trial")
+            with Journal(tmp_path / "killed" / "journal.sqlite") as journal:
+                numbers = [trial.number for trial in journal.trials()]
+            assert numbers == list(range(1, len(numbers) + 1))
+            assert len(numbers) >= kept + lines_before_the_kill
+            kept = len(numbers)
+        for folder in ("killed", "whole"):
+            output, _ = start(tmp_path / folder).communicate(timeout=60)
+            assert "trial 40/40" in output
+        with Journal(tmp_path / "killed" / "journal.sqlite") as a, Journal(tmp_path / "whole" / "journal.sqlite") as b:
+            assert [t.theta.tolist() for t in a.trials()] == [t.theta.tolist() for t in b.trials()]
+            assert [t.J for t in a.trials()] == [t.J for t in b.trials()]
+
+    def test_more_iterations_may_be_asked_for_later(self, toy_study, tmp_path):
+        toy_study.run(tmp_path / "run", progress=None)
+        longer = replace(toy_study, iterations=7).run(tmp_path / "run", resume=True, progress=None)
+        assert len(longer.trials) == 13
+
+
+class TestFailures:
+    class Fragile:
+        """Breaks whenever a tension exceeds a limit, as a robot with a weak cable would."""
+
+        sample_time, inputs, outputs = 0.05, 3, 2
+
+        def __init__(self, weakest=9.9):
+            self.weakest = weakest
+            self.tension = np.zeros(3)
+
+        def reset(self, tip=None, *, seed=None, tension_bounds=(-inf, inf)):
+            self.y = np.zeros(2)
+            return self.y
+
+        def step(self, tension, tip_force=None):
+            if np.abs(tension).max() > self.weakest:
+                raise PlantFailure("a cable broke")
+            self.y = self.y + 0.2 * (0.005 * np.array([tension[0], tension[1] - tension[2]]) - self.y)
+            return self.y
+
+    @pytest.fixture
+    def fragile(self):
+        return Study(
+            plant=self.Fragile(), mpc=LinearMPC(Modal()), task=Circle(duration=1.0, period=2.0), seed_points=8, iterations=4
+        )
+
+    def test_a_failed_trial_is_kept_with_its_reason_and_its_record_until_then(self, fragile, tmp_path):
+        result = fragile.run(tmp_path / "run", progress=None)
+        failed = [trial for trial in result.trials if trial.failure]
+        assert failed
+        assert all(trial.failure == "PlantFailure: a cable broke" and trial.J is None for trial in failed)
+        cut = result.episode(failed[0].number)
+        assert len(cut.output) == len(cut.tension) + 1 < 21
+        assert result.best.failure is None
+
+    def test_when_nothing_succeeds_the_reasons_are_said(self, fragile, tmp_path):
+        result = replace(fragile, plant=self.Fragile(0.0), iterations=1).run(tmp_path / "run", progress=None)
+        assert len(result.trials) == 9
+        with pytest.raises(RunError, match="none of the 9 trials .* succeeded: PlantFailure: a cable broke"):
+            _ = result.best
+
+    def test_an_episode_beyond_its_time_limit_has_failed(self, toy_study, tmp_path):
+        class Slow(type(toy_study.plant)):
+            def step(self, tension, tip_force=None):
+                time.sleep(0.02)
+                return super().step(tension, tip_force)
+
+        study = replace(toy_study, plant=Slow(), seed_points=1, iterations=0, time_limit=0.1)
+        (trial,) = study.run(tmp_path / "run", progress=None).trials
+        assert trial.failure == "TimeoutError: took longer than its limit of 0.1 s"
+
+    def test_outputs_that_are_not_finite_are_a_failure_and_not_a_cost(self, toy_study, tmp_path):
+        class Blind(type(toy_study.plant)):
+            def measured(self):
+                return np.full(2, np.nan)
+
+        study = replace(toy_study, plant=Blind(), seed_points=1, iterations=0)
+        (trial,) = study.run(tmp_path / "run", progress=None).trials
+        assert trial.J is None
+        assert "y must be finite" in trial.failure
+
+
+class TestRunFolder:
+    def test_one_that_exists_is_not_touched_without_resume(self, toy_study, tmp_path):
+        (tmp_path / "notes.txt").write_text("mine")
+        with pytest.raises(RunError, match="exists already; resume it"):
+            toy_study.run(tmp_path, progress=None)
+        assert [file.name for file in tmp_path.iterdir()] == ["notes.txt"]
+
+    def test_another_studys_run_is_refused_and_the_difference_named(self, toy_study, tmp_path):
+        replace(toy_study, iterations=0).run(tmp_path / "run", progress=None)
+        other = replace(toy_study, mpc=replace(toy_study.mpc, R=2.0), seed=3)
+        with pytest.raises(RunError, match=r"other settings: mpc\.R was 1\.0 and is 2\.0; seed was 0 and is 3"):
+            other.run(tmp_path / "run", resume=True, progress=None)
+
+    def test_a_second_writer_is_told_who_holds_it(self, toy_study, tmp_path):
+        replace(toy_study, iterations=0).run(tmp_path / "run", progress=None)
+        with (
+            Journal(tmp_path / "run" / "journal.sqlite", writer=True),
+            pytest.raises(JournalError, match=f"is being written by process {os.getpid()}"),
+        ):
+            toy_study.run(tmp_path / "run", resume=True, progress=None)
+
+    @pytest.mark.parametrize("damage", ["truncated", "overwritten", "foreign"])
+    def test_a_damaged_or_foreign_journal_is_refused_in_a_sentence_and_left_alone(self, toy_study, tmp_path, damage):
+        replace(toy_study, iterations=0).run(tmp_path / "run", progress=None)
+        path = tmp_path / "run" / "journal.sqlite"
+        whole = path.read_bytes()
+        if damage == "truncated":
+            path.write_bytes(whole[: len(whole) // 2])
+        elif damage == "overwritten":
+            path.write_bytes(b"not a database at all" * 200)
+        else:
+            path.unlink()
+            with sqlite3.connect(path) as database:
+                database.execute("CREATE TABLE letters (text)")
+        before = path.read_bytes()
+        with pytest.raises(JournalError, match="damaged or no journal"):
+            toy_study.run(tmp_path / "run", resume=True, progress=None)
+        assert path.read_bytes() == before
+
+    def test_settings_are_stored_whole_and_make_the_study_again(self, toy_study, tmp_path):
+        from socasadi import Rod, SimulatedPlant
+
+        study = replace(toy_study, plant=SimulatedPlant(Rod.preset("paper")), task=Circle(), seed=7)
+        stored = json.loads(json.dumps(study.settings))
+        again = Study.from_settings(stored)
+        assert again.settings == study.settings
+        assert again.mpc == study.mpc
+        assert again.plant.rod == study.plant.rod
+
+    def test_a_robot_of_the_users_own_can_only_be_made_by_the_script(self, toy_study, tmp_path):
+        toy_study.run(tmp_path / "run", progress=None)
+        with pytest.raises(RunError, match="which only its study script can make"):
+            Result.open(tmp_path / "run")
+
+    @pytest.mark.parametrize("content", ["", "{}", "{nonsense"])
+    def test_damaged_settings_are_said(self, tmp_path, content):
+        (tmp_path / "study.json").write_text(content)
+        with pytest.raises(RunError, match="study.json is damaged"):
+            Result.open(tmp_path)
+
+
+class TestStudy:
+    @pytest.mark.parametrize(
+        ("changes", "words"),
+        [
+            ({"mpc": LinearMPC(Modal(), sample_time=0.1)}, "sample_time of the plant is 0.05, but 0.1 of the MPC"),
+            ({"mpc": LinearMPC(Modal(inputs=4))}, "inputs of the plant is 3, but 4"),
+            ({"seed_points": 0}, "seed_points is an integer of at least 1, not 0"),
+            ({"iterations": -1}, "iterations is an integer of at least 0, not -1"),
+            ({"search": "annealing"}, "unknown search 'annealing'; there are bayesian, paper, sobol"),
+            ({"time_limit": 0}, "time_limit must be positive"),
+        ],
+    )
+    def test_parts_that_do_not_fit_are_named(self, toy_study, changes, words):
+        with pytest.raises(ValueError, match=words):
+            replace(toy_study, **changes)
+
+    def test_the_sobol_baseline_starts_with_the_same_points_and_noise(self, toy_study, tmp_path):
+        search = toy_study.run(tmp_path / "search", progress=None)
+        sobol = toy_study.sobol_only().run(tmp_path / "sobol", progress=None)
+        seeds = toy_study.seed_points
+        assert [t.J for t in sobol.trials[:seeds]] == [t.J for t in search.trials[:seeds]]
+        assert len(sobol.trials) == len(search.trials)
+
+
+class TestAssessment:
+    def test_no_verification_is_flown_twice(self, toy_study, tmp_path):
+        result = toy_study.run(tmp_path / "run", progress=None)
+        first = assess(result)
+        steps = []
+        original = type(toy_study.plant).step
+        counted = replace(toy_study, plant=toy_study.plant)
+        toy_study.plant.step = lambda *a, **k: (steps.append(1), original(toy_study.plant, *a, **k))[1]
+        second = assess(Result(counted, result.folder))
+        assert not steps
+        np.testing.assert_array_equal(first["best"].J, second["best"].J)
+
+    def test_the_identified_theta_predicts_no_worse_than_the_tuned_one(self, toy_study, tmp_path):
+        verdicts = assess(toy_study.run(tmp_path / "run", progress=None))
+        assert verdicts["identified"].prediction_error <= 1.05 * verdicts["best"].prediction_error
