@@ -2,9 +2,10 @@
 
     Rod -> SimulatedPlant -> Study -> Result -> C
 
-A :class:`Study` searches for the parameters theta of a linear prediction model with which a constrained :class:`LinearMPC`
-performs a task best on a plant; its :class:`Result` exports that controller as C. The method starts from Pal, He and Wei,
-"Sample-efficient Model Predictive Control Design of Soft Robotics by Bayesian Optimization" (arXiv 2210.08780).
+A :class:`Study` searches for the parameters theta of a linear prediction model with which a constrained
+:class:`LinearMPC` performs a task best on a plant; its :class:`Result` exports that controller as C. The method starts
+from Pal, He and Wei, "Sample-efficient Model Predictive Control Design of Soft Robotics by Bayesian Optimization"
+(arXiv 2210.08780).
 
 Names and the paper's symbols:
 

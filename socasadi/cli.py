@@ -64,7 +64,9 @@ def run(
         with _progress("Sobol points, the baseline") as progress:
             baseline = study.sobol_only().run(folder / "sobol", resume=resume, progress=progress)
     except KeyboardInterrupt:
-        out.print(f"\nStopped. Every finished trial is stored; go on with: socasadi run {script} --out {folder} --resume")
+        out.print(
+            f"\nStopped. Every finished trial is stored; go on with: socasadi run {script} --out {folder} --resume"
+        )
         raise typer.Exit(130) from None
     rivals = {} if not any(trial.J is not None for trial in baseline.trials) else {"Sobol": baseline.best.theta}
     with out.status("assessing") as status:
@@ -198,7 +200,11 @@ def _found(result: Result) -> str:
 
 
 def _theta(result: Result, trial: Trial) -> None:
-    table = Table(box=None, show_header=False, title=f"\ntheta of trial {trial.number}:", title_justify="left", title_style="")
+    table = Table(
+        box=None, show_header=False, title=f"\ntheta of trial {trial.number}:", title_justify="left", title_style=""
+    )
     for entry, value in zip(result.study.mpc.model.entries, trial.theta, strict=True):
-        table.add_row(f"  {entry.name}", f"{value:.5g}", entry.unit, f"[{entry.lower:g}, {entry.upper:g}]".replace("[", "\\["))
+        table.add_row(
+            f"  {entry.name}", f"{value:.5g}", entry.unit, f"[{entry.lower:g}, {entry.upper:g}]".replace("[", "\\[")
+        )
     out.print(table)

@@ -46,4 +46,6 @@ class ShortCircle(Circle):
 @pytest.fixture
 def toy_study():
     """A study of 12 trials of 20 samples that runs in a second or two."""
-    return Study(plant=ToyPlant(), mpc=LinearMPC(Modal()), task=ShortCircle(), seed_points=6, iterations=6, verifications=1)
+    return Study(
+        plant=ToyPlant(), mpc=LinearMPC(Modal()), task=ShortCircle(), seed_points=6, iterations=6, verifications=1
+    )

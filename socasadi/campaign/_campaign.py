@@ -24,9 +24,7 @@ if TYPE_CHECKING:
 _MAY_DIFFER = ("iterations", "verifications")
 
 
-def run_campaign(
-    study: "Study", folder: Path, *, resume: bool, progress: Callable[[Progress], None] | None
-) -> Result:
+def run_campaign(study: "Study", folder: Path, *, resume: bool, progress: Callable[[Progress], None] | None) -> Result:
     """Ask, build, fly, score, store, tell, until the study has its trials; see :meth:`Study.run`."""
     _prepare(study, folder, resume)
     with Journal(journal_path(folder), writer=True) as journal:
@@ -52,16 +50,16 @@ def _prepare(study: "Study", folder: Path, resume: bool) -> None:
         if not resume:
             raise RunError(f"{folder} exists already; resume it (--resume), or name another folder")
         changed = [
-            line
-            for line in differences(read_settings(folder), study.settings)
-            if line.split(" ")[0] not in _MAY_DIFFER
+            line for line in differences(read_settings(folder), study.settings) if line.split(" ")[0] not in _MAY_DIFFER
         ]
         if changed:
             raise RunError(f"{folder} holds a run with other settings: {'; '.join(changed)}")
     folder.mkdir(parents=True, exist_ok=True)
     about = {
         "settings": study.settings,
-        "versions": {name: importlib.metadata.version(name) for name in ("socasadi", "casadi", "numpy", "scipy", "GPy")},
+        "versions": {
+            name: importlib.metadata.version(name) for name in ("socasadi", "casadi", "numpy", "scipy", "GPy")
+        },
         "python": platform.python_version(),
         "machine": platform.machine(),
     }

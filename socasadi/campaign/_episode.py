@@ -59,33 +59,23 @@ class Episode:
 def fly(plant: Plant, controller: Controller, task: Task, *, seed: int, time_limit: float) -> Episode:
     """Run ``controller`` against ``plant`` along the task's reference.
 
-    What the plant raises ends the episode and is its ``failure``, as is an episode that takes longer than ``time_limit``
-    s of wall time; the samples until then are kept.
-
-    Raises
-    ------
-    ValueError
-        The controller and the plant do not fit each other.
+    What the plant raises ends the episode and is its ``failure``, as is more than ``time_limit`` s of wall time; the
+    samples until then are kept.
     """
     mpc = controller.mpc
     samples, preview = task.samples(mpc.sample_time), np.arange(1, mpc.horizon + 1)
     flight = _Flight(plant, mpc.sample_time, task)
     deadline = time.monotonic() + time_limit
     try:
-        if task.start is None:
-            y = plant.reset(seed=seed, tension_bounds=mpc.input_bounds)
-        else:
-            y = plant.reset(tip=task.start, seed=seed, tension_bounds=mpc.input_bounds)
+        y = plant.reset(task.start, seed=seed, tension_bounds=mpc.input_bounds)
         flight.begin(y)
         controller.reset(plant.tension)
         for t in range(samples):
             if time.monotonic() > deadline:
                 raise TimeoutError(f"took longer than its limit of {time_limit:g} s")
             u = controller.step(y, task.reference((t + preview) * mpc.sample_time))
-            if task.pulse is None:
-                y = plant.step(u)
-            else:
-                y = plant.step(u, tip_force=task.pulse.at(t * mpc.sample_time))
+            force = {} if task.pulse is None else {"tip_force": task.pulse.at(t * mpc.sample_time)}
+            y = plant.step(u, **force)
             flight.note(u, y)
     except Exception as error:  # whatever a plant raises is a result of the experiment
         return flight.end(controller.info.fallbacks, failure=f"{type(error).__name__}: {error}")

@@ -112,7 +112,9 @@ class Journal:
             raise JournalError(f"there is no journal at {path}")
         fresh = not path.exists()
         with self._reading():
-            self._database = sqlite3.connect(f"{path.resolve().as_uri()}?mode={'rwc' if writer else _read_mode(path)}", uri=True)
+            self._database = sqlite3.connect(
+                f"{path.resolve().as_uri()}?mode={'rwc' if writer else _read_mode(path)}", uri=True
+            )
             if fresh:
                 self._database.executescript(
                     f"PRAGMA journal_mode=WAL; BEGIN; {_TABLES} INSERT INTO about VALUES ({SCHEMA}); COMMIT;"
@@ -200,7 +202,8 @@ class Journal:
             yield
         except (sqlite3.DatabaseError, json.JSONDecodeError, ValueError) as error:
             raise JournalError(
-                f"{self.path} is damaged or no journal of socasadi ({error}); restore it from a copy, or start anew in another folder"
+                f"{self.path} is damaged or no journal of socasadi ({error}); "
+                "restore it from a copy, or start anew in another folder"
             ) from error
 
     @contextlib.contextmanager

@@ -85,7 +85,9 @@ class Result:
         best = best_trial(self.trials)
         if best is None:
             reasons = "; ".join(sorted({trial.failure or "" for trial in self.trials})[:3])
-            raise RunError(f"none of the {len(self.trials)} trials in {self.folder} succeeded: {reasons or 'none was made'}")
+            raise RunError(
+                f"none of the {len(self.trials)} trials in {self.folder} succeeded: {reasons or 'none was made'}"
+            )
         return best
 
     @property
@@ -140,5 +142,7 @@ class Result:
     def _journal(self) -> Journal:
         path = journal_path(self.folder)
         if not path.exists():
-            raise JournalError(f"{self.folder} has no journal.sqlite: restore it from a copy, or start anew in another folder")
+            raise JournalError(
+                f"{self.folder} has no journal.sqlite: restore it from a copy, or start anew in another folder"
+            )
         return Journal(path)

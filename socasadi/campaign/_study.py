@@ -81,7 +81,9 @@ class Study:
             raise ValueError(f"unknown search {self.search!r}; there are {', '.join(get_args(SearchName))}")
         rows = np.asarray(self.task.reference(np.zeros(1)))
         if rows.shape != (1, mpc.outputs):
-            raise ValueError(f"the task's reference has shape {rows.shape} for one instant; (1, {mpc.outputs}) is needed")
+            raise ValueError(
+                f"the task's reference has shape {rows.shape} for one instant; (1, {mpc.outputs}) is needed"
+            )
         self.task.samples(mpc.sample_time)
         weight_matrix(self.cost.Q, mpc.outputs, "Q of the cost")
         weight_matrix(self.cost.R, mpc.inputs, "R of the cost")

@@ -60,7 +60,7 @@ def export(record: ControllerRecord, folder: str | Path, *, real: str = "double"
     laws.add(qp_law)
     laws.add(plain_law)
     laws.generate(f"{folder}/")
-    for source in files(__package__).joinpath("c").iterdir():
+    for source in files("socasadi.export").joinpath("c").iterdir():
         (folder / source.name).write_text(source.read_text())
     version = _copy_osqp(folder / "osqp")
 
@@ -108,7 +108,9 @@ def build_and_replay(folder: str | Path) -> str:
     compiler = c_compiler()
     if compiler is None or shutil.which("make") is None:
         missing = "C compiler" if compiler is None else "make"
-        raise ExportError(f"the exported controller was not built: no {missing} found; run 'make test' in {folder} where there is one")
+        raise ExportError(
+            f"the exported controller was not built: no {missing} found; run 'make test' in {folder} where there is one"
+        )
     run = subprocess.run(
         ["make", "-s", f"CC={compiler}", "test"], cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL
     )

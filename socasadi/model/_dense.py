@@ -14,8 +14,8 @@ class Dense(PredictionModel):
     A state-space model of order n has :math:`n^2` directions (the choice of coordinates) that change theta and not the
     model. They are fixed by the observable pseudo-canonical form (Ljung, System Identification, 2nd ed., section
     4.4, appendix 4A): the states are the outputs and then their rates, so that :math:`C = [I\ 0]` and the first rows
-    of A only link outputs to rates. Free are n p entries of A, n m of B and, with ``feedthrough``, p m of D: 10, 15 and 20
-    numbers for orders 2, 3 and 4 with two outputs and three inputs.
+    of A only link outputs to rates. Free are n p entries of A, n m of B and, with ``feedthrough``, p m of D: 10, 15 and
+    20 numbers for orders 2, 3 and 4 with two outputs and three inputs.
 
     The form is written with the forward difference :math:`\delta x = (x_+ - x)/T`: :math:`A = I + T A_\delta`,
     :math:`B = T B_\delta`. Entries are then rates in SI units, hardly move with the sample time T, and

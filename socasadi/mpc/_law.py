@@ -18,9 +18,9 @@ def control_law(mpc: "LinearMPC", design: Design, *, with_qp: bool = True) -> ca
     clipped unconstrained law, 2 for the held input, and the KKT residual.
 
     The state is predicted with the input that was applied and corrected by y; a y that is not finite corrects nothing.
-    An answer of the QP is believed when its KKT residual is at most 1e-6. Else the unconstrained law is applied, clipped
-    to the bounds, and when that is not finite either, the input before. With ``with_qp=False`` the QP is left out: this
-    Function takes over where the solver itself gives up.
+    An answer of the QP is believed when its KKT residual is at most 1e-6. Else the unconstrained law is applied,
+    clipped to the bounds, and when that is not finite either, the input before. With ``with_qp=False`` the QP is left
+    out: this Function takes over where the solver itself gives up.
     """
     n, m, p, N = len(design.A), mpc.inputs, mpc.outputs, mpc.horizon
     y, reference = casadi.MX.sym("y", p), casadi.MX.sym("reference", N * p)  # pyright: ignore

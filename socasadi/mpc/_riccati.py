@@ -9,10 +9,10 @@ def riccati(A: casadi.MX, B: casadi.MX, Q: casadi.MX, R: casadi.MX, S: casadi.MX
     .. math:: P = A'PA + Q - (A'PB + S)(B'PB + R)^{-1}(B'PA + S')
 
     Structure-preserving doubling (Chu, Fan, Lin, Wang, "Structure-preserving algorithms for periodic discrete-time
-    algebraic Riccati equations", Int. J. Control 77, 2004): step k is the cost-to-go over :math:`2^k` samples from a zero
-    terminal cost, so that the limit is the smallest positive semidefinite solution. A fixed number of steps covers
-    2.6e5 samples. The expression is not checked here: where no solution exists the values grow, and the
-    design that uses them is refused for its residual (:mod:`._design`).
+    algebraic Riccati equations", Int. J. Control 77, 2004): step k is the cost-to-go over :math:`2^k` samples from a
+    zero terminal cost, so that the limit is the smallest positive semidefinite solution. A fixed number of steps covers
+    2.6e5 samples. The expression is not checked here: where no solution exists the values grow, and the design that
+    uses them is refused for its residual (:mod:`._design`).
     """
     if S is not None:
         A, Q = A - B @ casadi.solve(R, S.T), Q - S @ casadi.solve(R, S.T)

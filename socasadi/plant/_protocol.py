@@ -18,8 +18,8 @@ class Plant(Protocol):
     """What a closed-loop experiment needs of a robot, simulated or real.
 
     A sample goes: ``step(tension)`` holds the tension for one ``sample_time`` and returns what is measured then.
-    A plant that also has an attribute ``tip``, the true position (3,) in m, lets an experiment report the true
-    error; a robot on a bench has none.
+    A plant may know more: ``true_output`` (outputs,), without which experiments report errors by what was measured, and
+    ``shape(n)`` (n, 3) m, without which they hold no shapes.
     """
 
     @property

@@ -1,4 +1,3 @@
-from dataclasses import asdict
 from functools import cached_property
 from math import inf, isfinite
 from typing import Any, SupportsFloat
@@ -7,9 +6,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..codegen import compiled
+from ..codegen import Buffered, compiled
 from ..rod import Rod
-from ._buffered import Buffered
 from ._output import Output, TipDisplacement
 from ._protocol import PlantFailure
 
@@ -58,6 +56,7 @@ class SimulatedPlant:
         self._state: np.ndarray | None = None
         self._tension = np.zeros(self.inputs)
         self._tip = np.full(3, np.nan)
+        self._seen = np.full(self.outputs, np.nan)
         self._samples = 0
 
     @property
@@ -82,6 +81,12 @@ class SimulatedPlant:
         return self._tip.copy()
 
     @property
+    def true_output(self) -> np.ndarray:
+        """What a sensor without noise would have measured (outputs,)."""
+        self._running()
+        return self._seen.copy()
+
+    @property
     def state(self) -> np.ndarray:
         """The rod's state x = [q; v] (2 dof,)."""
         return self._running().copy()
@@ -94,15 +99,6 @@ class SimulatedPlant:
     def shape(self, n: int = 50) -> np.ndarray:
         """Positions (n, 3), m, of ``n`` points evenly spaced along the rod now."""
         return self.rod.centreline(self._running()[: self.rod.dof], n)
-
-    def settings(self) -> dict[str, Any]:
-        """Every setting as plain numbers, strings, lists and dictionaries, fit for JSON."""
-        return {
-            "rod": self.rod.to_dict(),
-            "sample_time": self.sample_time,
-            "noise": self.noise,
-            "output": {"kind": type(self.output).__name__, **asdict(self.output)},  # type: ignore[call-overload]
-        }
 
     def reset(
         self, tip: ArrayLike | None = None, *, seed: int | None = None, tension_bounds: tuple[Any, Any] = (-inf, inf)
@@ -169,14 +165,12 @@ class SimulatedPlant:
         state = self._running()
         applied = _finite("tension", tension, self.inputs, "N")
         force = _NO_FORCE if tip_force is None else _finite("tip_force", tip_force, 3, "N")
-        for array, value in zip(self._advance.inputs, (state, applied, force), strict=True):
-            array[:] = value
-        self._advance()
+        advanced = self._advance(state, applied, force)
         self._tension = applied
         self._samples += 1
-        return self._settle(*(array.copy() for array in self._advance.outputs))
+        return self._settle(*advanced)
 
-    def _settle(self, state: np.ndarray, tip: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    def _settle(self, state: np.ndarray, tip: np.ndarray, seen: np.ndarray) -> np.ndarray:
         self._state = None
         if not np.isfinite(state).all():
             raise PlantFailure(f"the state is not finite at {self.time:g} s")
@@ -186,10 +180,10 @@ class SimulatedPlant:
                 f"the tip is {distance:.3g} m from the base at {self.time:g} s, more than {_FARTHEST} times "
                 f"the rod's length of {length:g} m"
             )
-        if not np.isfinite(measured).all():
+        if not np.isfinite(seen).all():
             raise PlantFailure(f"the sensor {type(self.output).__name__} sees nothing at {self.time:g} s")
-        self._state, self._tip = state, tip
-        return measured + self.noise * self._random.standard_normal(self.outputs)
+        self._state, self._tip, self._seen = state, tip, seen
+        return seen + self.noise * self._random.standard_normal(self.outputs)
 
     def _running(self) -> np.ndarray:
         if self._state is None:

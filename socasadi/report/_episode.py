@@ -24,7 +24,9 @@ def responses(episode: Episode, limits: Limits | None) -> Figure:
     outputs = episode.output.shape[1]
     figure, rows = page(COLUMN, (22 + 32 * outputs) * MM, outputs)
     for i, axes in enumerate(rows):
-        axes.plot(episode.time, 1e3 * episode.reference[:, i], color=BLACK, ls="--", lw=0.9, label="reference", zorder=3)
+        axes.plot(
+            episode.time, 1e3 * episode.reference[:, i], color=BLACK, ls="--", lw=0.9, label="reference", zorder=3
+        )
         axes.plot(episode.time, 1e3 * episode.output[:, i], color=GREY, lw=0.5, label="measured")
         axes.plot(episode.time, 1e3 * episode.truth[:, i], color=BLUE, lw=1.1, label="true")
         if limits is not None:
@@ -33,6 +35,7 @@ def responses(episode: Episode, limits: Limits | None) -> Figure:
         axes.set_ylabel(f"{_output_name(i, outputs)} / mm")
         axes.margins(x=0)
     rows[-1].set_xlabel("time / s")
+    rows[-1].xaxis.set_major_locator(MaxNLocator(5))
     legend_above(rows[0], 4)
     return figure
 
@@ -66,6 +69,7 @@ def inputs(episode: Episode, limits: Limits) -> Figure:
     for i, limit in enumerate(sorted({float(value) for side in limits for value in side})):
         axes.axhline(limit, color=GREY, ls=":", lw=1, label=None if i else "bounds")
     axes.set_xlabel("time / s")
+    axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.set_ylabel("tension / N")
     axes.margins(x=0)
     legend_above(axes, 4)
@@ -79,8 +83,9 @@ def shapes(episode: Episode, instants: int = 6) -> Figure | None:
     """
     if not len(episode.shapes):
         return None
+    figure = Figure(figsize=(COLUMN, 92 * MM))
     # Constrained layout does not know how far the labels of three dimensions reach.
-    figure = Figure(figsize=(COLUMN, 92 * MM), layout="none")
+    figure.set_layout_engine("none")
     axes = figure.add_subplot(projection="3d")
     chosen = np.unique(np.linspace(0, len(episode.shapes) - 1, instants).round().astype(int))
     every = (len(episode.output) - 1) / max(len(episode.shapes) - 1, 1)
@@ -98,7 +103,7 @@ def shapes(episode: Episode, instants: int = 6) -> Figure | None:
         axes.plot(wanted[:, 0], wanted[:, 1], height, color=BLACK, ls="--", lw=0.8, label="reference")
     side = max(1.15e3 * np.abs(episode.shapes[:, :, 1:]).max(), 0.1 * length)
     axes.set(xlim=(-side, side), ylim=(-side, side), zlim=(0, 1.02 * length))
-    axes.set_box_aspect((1, 1, 1.5), zoom=0.86)
+    axes.set_box_aspect((1, 1, 1.5), zoom=0.86)  # pyright: ignore[reportArgumentType]
     axes.set(xlabel="y / mm", ylabel="z / mm", zlabel="x / mm")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(5))

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from functools import cached_property
 from math import inf
 from typing import Any
@@ -282,10 +282,6 @@ class Rod:
         """Undamped frequencies, Hz, and damping ratios about ``equilibrium`` (default: at rest, cables slack)."""
         at = equilibrium or self.equilibrium()
         return modes(self, self._statics.tangent(at), at.q)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Every setting as plain numbers, lists and dictionaries."""
-        return asdict(self)
 
     @cached_property
     def _statics(self) -> Statics:

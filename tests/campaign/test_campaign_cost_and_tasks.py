@@ -29,7 +29,7 @@ class TestCost:
     scale = np.array([10.0, 10.0, 10.0])
 
     def test_tracking_counts_the_outputs_after_each_input_and_not_the_one_before_the_first(self):
-        assert Cost(Q=100, R=0).score(self.flown, self.scale).J == pytest.approx(100 * (0.01 + 0.04))
+        assert pytest.approx(100 * (0.01 + 0.04)) == Cost(Q=100, R=0).score(self.flown, self.scale).J
 
     @pytest.mark.parametrize(
         ("term", "by_hand"),
@@ -38,7 +38,7 @@ class TestCost:
     def test_the_input_term_weighs_newtons_shares_or_changes_of_shares(self, term, by_hand):
         score = Cost(Q=0, R=1, input_term=term).score(self.flown, self.scale)
         assert score.effort == pytest.approx(by_hand)
-        assert score.J == pytest.approx(by_hand)
+        assert pytest.approx(by_hand) == score.J
 
     def test_the_literal_cost_stands_beside_whatever_term_is_chosen(self):
         assert Cost(Q=100, R=1, input_term="rate").score(self.flown, self.scale).literal == pytest.approx(5 + 24)
@@ -53,7 +53,7 @@ class TestCost:
     def test_matrix_weights_are_quadratic_forms(self):
         Q = ((2.0, 1.0), (1.0, 3.0))
         flown = episode([[0, 0], [1, 2]], np.zeros((2, 2)), np.zeros((1, 3)))
-        assert Cost(Q=Q, R=0).score(flown, self.scale).J == pytest.approx(2 + 4 + 12)
+        assert pytest.approx(2 + 4 + 12) == Cost(Q=Q, R=0).score(flown, self.scale).J
 
     def test_an_unknown_input_term_is_named(self):
         with pytest.raises(ValueError, match=r"unknown input_term 'effort'; there are rate, normalised, literal"):

@@ -45,7 +45,8 @@ class TestContinuation:
             "import sys; sys.path.insert(0, sys.argv[2])\n"
             "from conftest import ToyPlant, ShortCircle\n"
             "from socasadi import *\n"
-            "study = Study(plant=ToyPlant(), mpc=LinearMPC(Modal()), task=ShortCircle(), seed_points=40, iterations=0)\n"
+            "mpc = LinearMPC(Modal())\n"
+            "study = Study(plant=ToyPlant(), mpc=mpc, task=ShortCircle(), seed_points=40, iterations=0)\n"
             "study.run(sys.argv[1], resume=True)\n"
         )
 
@@ -101,7 +102,11 @@ class TestFailures:
     @pytest.fixture
     def fragile(self):
         return Study(
-            plant=self.Fragile(), mpc=LinearMPC(Modal()), task=Circle(duration=1.0, period=2.0), seed_points=8, iterations=4
+            plant=self.Fragile(),
+            mpc=LinearMPC(Modal()),
+            task=Circle(duration=1.0, period=2.0),
+            seed_points=8,
+            iterations=4,
         )
 
     def test_a_failed_trial_is_kept_with_its_reason_and_its_record_until_then(self, fragile, tmp_path):
@@ -116,7 +121,7 @@ class TestFailures:
     def test_when_nothing_succeeds_the_reasons_are_said(self, fragile, tmp_path):
         result = replace(fragile, plant=self.Fragile(0.0), iterations=1).run(tmp_path / "run", progress=None)
         assert len(result.trials) == 9
-        with pytest.raises(RunError, match="none of the 9 trials .* succeeded: PlantFailure: a cable broke"):
+        with pytest.raises(RunError, match=r"none of the 9 trials .* succeeded: PlantFailure: a cable broke"):
             _ = result.best
 
     def test_an_episode_beyond_its_time_limit_has_failed(self, toy_study, tmp_path):
@@ -197,7 +202,7 @@ class TestRunFolder:
     @pytest.mark.parametrize("content", ["", "{}", "{nonsense"])
     def test_damaged_settings_are_said(self, tmp_path, content):
         (tmp_path / "study.json").write_text(content)
-        with pytest.raises(RunError, match="study.json is damaged"):
+        with pytest.raises(RunError, match=r"study\.json is damaged"):
             Result.open(tmp_path)
 
 

@@ -1,13 +1,12 @@
 """What a simulated plant promises an experiment: sampling, noise, static starts, named failures."""
 
-import json
 import pickle
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from socasadi.plant import LaserSpot, Plant, PlantFailure, SimulatedPlant, TipDisplacement
+from socasadi.plant import LaserSpot, Plant, PlantFailure, SimulatedPlant
 from socasadi.rod import EquilibriumError, Rod
 
 ROD = Rod.preset("paper")
@@ -196,13 +195,12 @@ def test_a_laser_that_misses_its_screen_is_a_failure():
         hold(laser, [80.0, -40.0, -40.0], 2.0)
 
 
-def test_settings_are_plain_and_complete():
-    one = SimulatedPlant(ROD, sample_time=0.02, noise=2e-3, output=LaserSpot(2.0))
-    settings = json.loads(json.dumps(one.settings()))
-    assert settings["rod"]["length"] == 0.6
-    assert settings["output"] == {"kind": "LaserSpot", "distance": 2.0}
-    assert (settings["sample_time"], settings["noise"]) == (0.02, 2e-3)
-    assert SimulatedPlant(ROD).settings()["output"] == {"kind": type(TipDisplacement()).__name__}
+def test_the_true_output_is_the_measurement_without_noise(plant):
+    noisy = SimulatedPlant(ROD, noise=1e-3)
+    noisy.reset(tip=(0.02, 0.01), seed=1)
+    measured = [noisy.step(noisy.tension) - noisy.true_output for _ in range(200)]
+    np.testing.assert_allclose(noisy.true_output, noisy.tip[1:], atol=1e-15)
+    assert 0.8e-3 < np.std(measured) < 1.2e-3
 
 
 def test_a_running_plant_can_be_sent_to_another_process(plant):
