@@ -208,3 +208,7 @@ def _theta(result: Result, trial: Trial) -> None:
             f"  {entry.name}", f"{value:.5g}", entry.unit, f"[{entry.lower:g}, {entry.upper:g}]".replace("[", "\\[")
         )
     out.print(table)
+
+
+if __name__ == "__main__":
+    main()

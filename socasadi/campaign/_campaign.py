@@ -72,19 +72,22 @@ def _try_next(study: "Study", search: Search, number: int) -> tuple[Trial, Episo
     started, begin = datetime.now(UTC).isoformat(timespec="seconds"), time.perf_counter()
     theta = search.ask()
     asked = time.perf_counter()
+    seconds = asdict(search.timings)
     episode, score = None, None
     try:
         controller = study.mpc.controller(theta)
     except DesignError as error:
         failure = f"DesignError: {error}"
     else:
+        seconds |= {"design": time.perf_counter() - asked}
         episode = fly_once(study, controller, stream=(0, number))
+        seconds |= episode.seconds
         failure = episode.failure
         if failure is None:
             score = study.cost.score(episode, study.mpc.input_scale)
             if not all(np.isfinite(list(asdict(score).values()))):
                 failure, score = f"the cost is not finite: {score}", None
-    seconds = {**asdict(search.timings), "ask": asked - begin, "episode": time.perf_counter() - asked}
+    seconds |= {"trial": time.perf_counter() - begin}
     phase = "seed" if number <= study.seed_points else "search"
     return Trial(number, phase, theta, score, failure, started, seconds), episode
 

@@ -1,5 +1,7 @@
 import time
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -8,8 +10,8 @@ from ..mpc import Controller
 from ..plant import Plant
 from ._task import Task
 
-_SHAPE_POINTS = 21
-_SHAPE_EVERY = 4
+_SHAPE_POINTS = 15
+_SHAPE_EVERY = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +30,13 @@ class Episode:
     held
         (m,) N, the tensions before the first sample.
     shapes
-        (k, points, 3) m, the rod every fourth sample; empty when the plant does not know its shape.
+        (k, points, 3) m, the rod every fifth sample; empty when the plant does not know its shape.
     fallbacks
         Samples in which the controller could not apply its QP's answer.
     failure
         Why the episode ended early, None when it did not.
+    seconds
+        Wall time spent in the ``"plant"`` and in the ``"controller"``.
     """
 
     sample_time: float
@@ -44,6 +48,7 @@ class Episode:
     shapes: np.ndarray
     fallbacks: int = 0
     failure: str | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
 
     @property
     def time(self) -> np.ndarray:
@@ -67,15 +72,19 @@ def fly(plant: Plant, controller: Controller, task: Task, *, seed: int, time_lim
     flight = _Flight(plant, mpc.sample_time, task)
     deadline = time.monotonic() + time_limit
     try:
-        y = plant.reset(task.start, seed=seed, tension_bounds=mpc.input_bounds)
+        with flight.timing("plant"):
+            y = plant.reset(task.start, seed=seed, tension_bounds=mpc.input_bounds)
         flight.begin(y)
         controller.reset(plant.tension)
         for t in range(samples):
             if time.monotonic() > deadline:
                 raise TimeoutError(f"took longer than its limit of {time_limit:g} s")
-            u = controller.step(y, task.reference((t + preview) * mpc.sample_time))
+            wanted = task.reference((t + preview) * mpc.sample_time)
+            with flight.timing("controller"):
+                u = controller.step(y, wanted)
             force = {} if task.pulse is None else {"tip_force": task.pulse.at(t * mpc.sample_time)}
-            y = plant.step(u, **force)
+            with flight.timing("plant"):
+                y = plant.step(u, **force)
             flight.note(u, y)
     except Exception as error:  # whatever a plant raises is a result of the experiment
         return flight.end(controller.info.fallbacks, failure=f"{type(error).__name__}: {error}")
@@ -92,6 +101,13 @@ class _Flight:
         self.tension: list[np.ndarray] = []
         self.shapes: list[np.ndarray] = []
         self.held = np.zeros(plant.inputs)
+        self.seconds = {"plant": 0.0, "controller": 0.0}
+
+    @contextmanager
+    def timing(self, part: str) -> Iterator[None]:
+        start = time.perf_counter()
+        yield
+        self.seconds[part] += time.perf_counter() - start
 
     def begin(self, y: np.ndarray) -> None:
         self.held = np.array(self.plant.tension, dtype=float)
@@ -120,4 +136,5 @@ class _Flight:
             shapes=np.reshape(self.shapes, (-1, _SHAPE_POINTS, 3)).astype(np.float32),
             fallbacks=fallbacks,
             failure=failure,
+            seconds=self.seconds,
         )

@@ -62,7 +62,8 @@ class Trial:
     started
         UTC, ISO 8601.
     seconds
-        Wall time spent on ``fit``, ``acquisition`` and ``episode``.
+        Wall time of the whole ``trial``, and of its parts: ``fit`` and ``acquisition`` of the search, ``design`` of the
+        controller, ``plant`` and ``controller`` during the episode.
     """
 
     number: int
@@ -246,7 +247,7 @@ _ARRAYS = ("output", "reference", "truth", "tension", "held", "shapes")
 
 
 def _pack(episode: Episode) -> bytes:
-    about = json.dumps([episode.sample_time, episode.fallbacks, episode.failure])
+    about = json.dumps([episode.sample_time, episode.fallbacks, episode.failure, episode.seconds])
     buffer = io.BytesIO()
     np.savez_compressed(buffer, about=np.array(about), **{name: getattr(episode, name) for name in _ARRAYS})
     return buffer.getvalue()
@@ -254,6 +255,6 @@ def _pack(episode: Episode) -> bytes:
 
 def _unpack(blob: bytes) -> Episode:
     with np.load(io.BytesIO(blob), allow_pickle=False) as data:
-        sample_time, fallbacks, failure = json.loads(data["about"].item())
+        sample_time, fallbacks, failure, seconds = json.loads(data["about"].item())
         arrays = {name: data[name] for name in _ARRAYS}
-    return Episode(sample_time, *arrays.values(), fallbacks=fallbacks, failure=failure)  # pyright: ignore
+    return Episode(sample_time, **arrays, fallbacks=fallbacks, failure=failure, seconds=seconds)

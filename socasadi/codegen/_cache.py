@@ -12,9 +12,7 @@ def cache_directory() -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OSError(
-            f"the cache folder {folder} cannot be created ({error.strerror}); set SOCASADI_CACHE to a writable folder"
-        ) from error
+        raise _unwritable(folder, error) from error
     return folder
 
 
@@ -26,7 +24,17 @@ def cached_file(name: str, build: Callable[[Path], None]) -> Path:
     """
     target = cache_directory() / name
     if not target.exists():
-        with tempfile.TemporaryDirectory(dir=target.parent, prefix=".building-") as scratch:
-            build(Path(scratch))
-            os.replace(Path(scratch) / name, target)
+        try:
+            scratch = tempfile.TemporaryDirectory(dir=target.parent, prefix=".building-")
+        except OSError as error:
+            raise _unwritable(target.parent, error) from error
+        with scratch as folder:
+            build(Path(folder))
+            os.replace(Path(folder) / name, target)
     return target
+
+
+def _unwritable(folder: Path, error: OSError) -> OSError:
+    return OSError(
+        f"the cache folder {folder} cannot be written to ({error.strerror}); set SOCASADI_CACHE to a writable folder"
+    )

@@ -52,7 +52,7 @@ def compiled(function: casadi.Function, *, flags: Sequence[str] = ()) -> casadi.
     if compiler is None:
         _warn_interpreted()
         return function
-    source = c_source(function)
+    source = _c_source(function)
     parts = (source, _compiler_identity(compiler), platform.machine(), *_FLAGS, *flags)
     digest = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
     name = f"{function.name()}-{digest}.so"
@@ -69,9 +69,8 @@ def compiled(function: casadi.Function, *, flags: Sequence[str] = ()) -> casadi.
     return casadi.external(function.name(), str(cached_file(name, build)))
 
 
-def c_source(function: casadi.Function, *, header: bool = False) -> str:
-    """C99 text of ``function``, as CasADi generates it, for callers that keep the text themselves."""
-    generator = casadi.CodeGenerator(f"{function.name()}.c", {"with_header": header})
+def _c_source(function: casadi.Function) -> str:
+    generator = casadi.CodeGenerator(f"{function.name()}.c")
     generator.add(function)
     return generator.dump()
 

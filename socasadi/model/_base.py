@@ -55,6 +55,8 @@ class PredictionModel(ABC):
             value = getattr(self, name)
             if not isinstance(value, int) or value < 1:
                 raise ValueError(f"{name} of {type(self).__name__} is a positive integer, not {value!r}")
+        if self.bounds is not None:
+            object.__setattr__(self, "bounds", _pairs(self.bounds))
         _ = self.entries
 
     @property
@@ -79,7 +81,7 @@ class PredictionModel(ABC):
                 f"bounds hold {len(self.bounds)} pairs, but theta of this {type(self).__name__} has {len(own)} entries"
             )
         return tuple(
-            replace(entry, lower=float(lo), upper=float(hi)) for entry, (lo, hi) in zip(own, self.bounds, strict=True)
+            replace(entry, lower=lower, upper=upper) for entry, (lower, upper) in zip(own, self.bounds, strict=True)
         )
 
     @property
@@ -89,7 +91,7 @@ class PredictionModel(ABC):
 
     def with_bounds(self, bounds: Sequence[tuple[float, float]]) -> Self:
         """The same family searched in another box."""
-        return replace(self, bounds=tuple((float(lo), float(hi)) for lo, hi in bounds))
+        return replace(self, bounds=_pairs(bounds))
 
     def check(self, theta: ArrayLike) -> np.ndarray:
         """``theta`` as floats (size,); ValueError when its shape is another or an entry is not finite."""
@@ -113,3 +115,10 @@ class PredictionModel(ABC):
     def state_space(self, theta: ArrayLike, sample_time: float) -> StateSpace:
         """The model of one theta as arrays."""
         return StateSpace(*(np.asarray(m.full()) for m in self.matrices(sample_time)(self.check(theta))))
+
+
+def _pairs(bounds: Sequence[Sequence[float]] | np.ndarray) -> tuple[tuple[float, float], ...]:
+    try:
+        return tuple((float(lower), float(upper)) for lower, upper in bounds)
+    except (TypeError, ValueError):
+        raise ValueError(f"bounds hold one pair (lower, upper) of numbers an entry of theta, not {bounds}") from None

@@ -111,5 +111,6 @@ class Controller:
         # The first call belongs to the making: it sets the solver up, and qpOASES has its say.
         with quiet(self.mpc.backend == "qpoases"):
             law = Buffered(control_law(self.mpc, self.design))
-            law(np.zeros(self.mpc.outputs), np.zeros(self.mpc.horizon * self.mpc.outputs), self._state)
+            p, n, m = self.mpc.outputs, len(self.design.A), self.mpc.inputs
+            law(np.zeros(p), np.zeros(self.mpc.horizon * p), np.zeros(n + p + m))
         return law

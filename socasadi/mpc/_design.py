@@ -82,8 +82,7 @@ def design_function(mpc: "LinearMPC", order: int) -> casadi.Function:
     lower, upper = (limit / mpc.input_scale for limit in mpc.input_limits)
     v_0, v_reference = steady_target(C @ rest + D, Q, on_input, casadi.DM((lower + upper) / 2))
     noise = casadi.DM.ones(p) * mpc.measurement_noise
-    input_noise = mpc.input_noise / float(np.mean(mpc.input_scale))
-    state_gain, disturbance_gain = kalman_gain(A, B, C, input_noise, mpc.disturbance_noise, noise)
+    state_gain, disturbance_gain = kalman_gain(A, B_newton, C, mpc.input_noise, mpc.disturbance_noise, noise)
     extended = casadi.diagcat(A, casadi.MX.eye(p))
     error_dynamics = (
         extended - casadi.vertcat(state_gain, disturbance_gain) @ casadi.horzcat(C, casadi.MX.eye(p)) @ extended
@@ -111,7 +110,7 @@ def design_function(mpc: "LinearMPC", order: int) -> casadi.Function:
         (difference, maps(N * m, v=-first), casadi.kron(casadi.DM.eye(N), on_rate)),
         (casadi.MX.eye(N * m), maps(N * m), casadi.kron(casadi.DM.eye(N), on_input)),
     ]
-    residual = casadi.MX(0)
+    residual, price = casadi.MX(0), casadi.MX(n, sum(widths.values()))
     if mpc.terminal == "riccati":
         cost_to_go, residual = _cost_to_go(A, B, C, D, Q, on_input, on_rate)
         newest = casadi.horzcat(casadi.MX(p, (N - 1) * p), casadi.MX.eye(p))
@@ -121,10 +120,16 @@ def design_function(mpc: "LinearMPC", order: int) -> casadi.Function:
             maps(m, d=-target_d, r=-target_r, one=-target_1),
         )
         terms.append((casadi.vertcat(prediction.last_forced, last), free, cost_to_go))
+        off_target = (C @ rest + D) @ maps(m, d=target_d, r=target_r, one=target_1) + maps(
+            p, d=casadi.MX.eye(p), r=-newest
+        )
+        price = casadi.solve(casadi.MX.eye(n) - A.T, C.T @ Q @ off_target)
 
     hessian = 2 * sum((forced.T @ weight @ forced for forced, _, weight in terms), casadi.MX(N * m, N * m))
     gradient = 2 * sum(
-        (forced.T @ weight @ free for forced, free, weight in terms), casadi.MX(N * m, sum(widths.values()))
+        (forced.T @ weight @ free for forced, free, weight in terms),
+        # Where the target is off the reference, as a weight on the input itself makes it, the cost-to-go has a slope.
+        prediction.last_forced.T @ A.T @ price,
     )
     law = -casadi.solve(hessian, gradient)[:m, :]
     rows, row_bounds = casadi.MX(0, N * m), casadi.MX(0, sum(widths.values()))

@@ -16,7 +16,7 @@ def kalman_gain(
     The model is extended by a disturbance d on the outputs that wanders as a random walk (Pannocchia and Rawlings,
     "Disturbance models for offset-free model-predictive control", AIChE J. 49, 2003):
 
-    .. math:: x_+ = A x + B (v + w), \quad d_+ = d + \xi, \quad y = C x + D v + d + e .
+    .. math:: x_+ = A x + B (u + w), \quad d_+ = d + \xi, \quad y = C x + D u + d + e .
 
     As many disturbances as outputs make the controller free of offset: at rest the estimate reproduces the measured
     outputs whatever the errors of A, B, C and D.
@@ -24,7 +24,7 @@ def kalman_gain(
     Parameters
     ----------
     input_noise
-        Standard deviation of w, in the unit of v.
+        Standard deviation of w, in the unit of the input of B.
     disturbance_noise
         Standard deviation of the step of d in one sample, m.
     measurement_noise

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import PredictionModel, StateSpace
-from ._design import Design, design_function
+from ._design import Design, DesignError, design_function
 from ._qp import BACKENDS, check_backend
-from ._weights import InputTerm, Weight, bound_pair, check_input_term, weight_matrix
+from ._weights import InputTerm, Weight, bound_pair, check_input_term, hashable, weight_matrix
 
 if TYPE_CHECKING:
     from ._controller import Controller
@@ -97,6 +97,8 @@ class LinearMPC:
         bound_pair(self.input_bounds, self.inputs, "input_bounds")
         if self.output_bounds is not None:
             bound_pair(self.output_bounds, self.outputs, "output_bounds")
+        for name in ("Q", "R", "input_bounds", "output_bounds"):
+            object.__setattr__(self, name, hashable(getattr(self, name)))
 
     @property
     def inputs(self) -> int:
@@ -151,7 +153,16 @@ class LinearMPC:
                 raise ValueError(
                     f"{name} has shape {matrix.shape}, but {shape} fits {n} states, {m} inputs, {p} outputs"
                 )
-        return Design.checked(self.design_function(n).call([A, B, C, D]))
+        if not all(np.isfinite(matrix).all() for matrix in (A, B, C, D)):
+            raise DesignError("the model gives no controller: its A, B, C or D is not finite")
+        try:
+            numbers = self.design_function(n).call([A, B, C, D])
+        except RuntimeError as error:
+            raise DesignError(
+                "the model gives no controller: a matrix that the design inverts is singular "
+                "(a pole at 1, inputs without any effect, or outputs without weight)"
+            ) from error
+        return Design.checked(numbers)
 
     @functools.lru_cache(maxsize=8)  # noqa: B019 (a specification is a small value; building its Function takes long)
     def design_function(self, order: int):

@@ -29,6 +29,13 @@ def weight_matrix(weight: Weight, size: int, name: str) -> np.ndarray:
     return matrix
 
 
+def hashable(value):
+    """``value`` with its lists and arrays as nested tuples."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    return tuple(hashable(item) for item in value) if isinstance(value, list | tuple) else value
+
+
 def check_input_term(term: str) -> None:
     """ValueError when no input term goes by that name."""
     if term not in get_args(InputTerm):

@@ -83,9 +83,8 @@ def shapes(episode: Episode, instants: int = 6) -> Figure | None:
     """
     if not len(episode.shapes):
         return None
-    figure = Figure(figsize=(COLUMN, 92 * MM))
     # Constrained layout does not know how far the labels of three dimensions reach.
-    figure.set_layout_engine("none")
+    figure = Figure(figsize=(COLUMN, 92 * MM), layout="none")  # pyright: ignore[reportArgumentType]
     axes = figure.add_subplot(projection="3d")
     chosen = np.unique(np.linspace(0, len(episode.shapes) - 1, instants).round().astype(int))
     every = (len(episode.output) - 1) / max(len(episode.shapes) - 1, 1)
