@@ -112,8 +112,8 @@ def _residual(system: StateSpace, record: Record) -> np.ndarray:
     # Column 0 is the response to the input from rest, the others the free responses to each first state.
     states = np.zeros((samples + 1, order, 1 + order))
     states[0, :, 1:] = np.eye(order)
-    forced = record.tension @ B.T
     with np.errstate(over="ignore", invalid="ignore"):
+        forced = record.tension @ B.T
         for t in range(samples):
             np.matmul(A, states[t], out=states[t + 1])
             states[t + 1, :, 0] += forced[t]

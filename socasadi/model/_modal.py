@@ -1,4 +1,5 @@
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi
@@ -16,7 +17,8 @@ class Modal(PredictionModel):
     :math:`\zeta` and the gains :math:`g` (m/N): ``axes * (2 + inputs)`` numbers, 10 for two axes and three cables.
     States are position and velocity of each axis; there is no feedthrough.
 
-    The default bounds are what the data sheet of the paper's rod gives within a factor of two, see :meth:`from_spec`.
+    The default bounds hold for a rod like the paper's of which nothing else is known, not even where its cables run;
+    :meth:`from_spec` and :func:`bounds_from_record` give tighter ones.
     """
 
     @property
@@ -31,15 +33,17 @@ class Modal(PredictionModel):
         bending_stiffness: float,
         mass_per_length: float,
         cable_offset: float,
+        cable_angles: Sequence[float] = (0.0, 120.0, 240.0),
         margin: float = 2.0,
         damping_ratio: tuple[float, float] = (0.02, 0.5),
-        axes: int = 2,
-        inputs: int = 3,
     ) -> "Modal":
-        r"""Bounds from a data sheet: the clamped Euler-Bernoulli beam, within a factor of ``margin`` either way.
+        r"""Bounds of a planar tip from a data sheet, by the formulas of the clamped Euler-Bernoulli beam.
 
         The first frequency is :math:`1.8751^2 \sqrt{EI / (\mu L^4)}`; a cable at distance d from the axis bends the rod
-        into an arc and moves its tip by :math:`d L^2 / (2 EI)` a newton.
+        into an arc, towards its own angle, and moves the tip by :math:`g = d L^2 / (2 EI)` a newton. The bounds
+        allow for a frequency that is off by a factor of ``margin`` either way, and for gains that are off by
+        :math:`(1 - 1/margin) g`: with the default, cables half or one and a half times as strong as the data sheet
+        has them, or 30 degrees off their angle.
 
         Parameters
         ----------
@@ -51,6 +55,8 @@ class Modal(PredictionModel):
             Mass per length, kg/m.
         cable_offset
             d, m.
+        cable_angles
+            Where each cable runs in the section, degrees from +y towards +z.
         margin
             How far the data sheet may be off, a factor above 1.
         damping_ratio
@@ -69,12 +75,13 @@ class Modal(PredictionModel):
             raise ValueError(f"margin is a factor above 1, not {margin}")
         frequency = 1.875104**2 * math.sqrt(bending_stiffness / (mass_per_length * length**4))
         gain = cable_offset * length**2 / (2 * bending_stiffness)
-        axis = (
-            (frequency / margin, frequency * margin),
-            damping_ratio,
-            *[(-margin * gain, margin * gain)] * inputs,
-        )
-        return cls(axes=axes, inputs=inputs, bounds=axis * axes)
+        bounds: list[tuple[float, float]] = []
+        for direction in (math.cos, math.sin):
+            centres = [gain * direction(math.radians(angle)) for angle in cable_angles]
+            width = gain * (1 - 1 / margin)
+            bounds += [(frequency / margin, frequency * margin), damping_ratio]
+            bounds += [(centre - width, centre + width) for centre in centres]
+        return cls(axes=2, inputs=len(centres), bounds=tuple(bounds))
 
     def _default_entries(self) -> tuple[Entry, ...]:
         entries: list[Entry] = []

@@ -4,7 +4,7 @@ import casadi
 import numpy as np
 
 from ._design import Design
-from ._qp import KKT_TOLERANCE, kkt_residual, qp_solver
+from ._qp import KKT_TOLERANCE, finite, kkt_residual, qp_solver
 
 if TYPE_CHECKING:
     from ._spec import LinearMPC
@@ -30,14 +30,14 @@ def control_law(mpc: "LinearMPC", design: Design, *, with_qp: bool = True) -> ca
 
     x = design.A @ x + design.B @ v_before
     innovation = y - (design.C @ x + design.D @ v_before + d)
-    innovation = casadi.if_else(_finite(y), innovation, casadi.DM.zeros(p))
+    innovation = casadi.if_else(finite(y), innovation, casadi.DM.zeros(p))
     x, d = x + design.state_gain @ innovation, d + design.disturbance_gain @ innovation
     parameters = casadi.vertcat(x, d, v_before, reference, 1)
 
     law: casadi.MX = casadi.DM(design.law) @ parameters
     held = casadi.fmin(casadi.fmax(v_before, lower), upper)
     # fmin and fmax drop a NaN, so the law is looked at before they hide it.
-    lawful = _finite(law)
+    lawful = finite(law)
     v = casadi.if_else(lawful, casadi.fmin(casadi.fmax(law, lower), upper), held)
     status = casadi.if_else(lawful, 1, 2)
     residual = casadi.MX(casadi.inf)
@@ -75,8 +75,3 @@ def _solve(
     answer = solver(h=H, g=g, a=A, lba=-np.inf, uba=row_bounds, lbx=lbx, ubx=ubx)
     residual = kkt_residual(H, g, A, row_bounds, lbx, ubx, answer["x"], answer["lam_x"], answer["lam_a"])
     return answer["x"], residual
-
-
-def _finite(values: casadi.MX) -> casadi.MX:
-    """1 when every entry is finite, else 0: only a finite number differs from itself by zero."""
-    return casadi.sum1(values - values) == 0

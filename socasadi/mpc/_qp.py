@@ -1,9 +1,7 @@
 """The QP solvers by name, one behaviour, and the test that each of their answers has to pass."""
 
 import contextlib
-import ctypes
 import os
-import sys
 from collections.abc import Iterator
 
 import casadi
@@ -58,8 +56,8 @@ def kkt_residual(
 ) -> casadi.MX:
     """Largest violation of the optimality conditions of min v'Hv/2 + g'v, lower <= v <= upper, A v <= upper_rows.
 
-    Stationarity (relative to 1 + max |g|), feasibility, signs of the multipliers and complementarity; NaN when the
-    answer holds one. Multipliers are positive at an upper bound, negative at a lower one; ``upper`` may be infinite.
+    Stationarity (relative to 1 + max |g|), feasibility, signs of the multipliers and complementarity; infinite when
+    the answer is not finite. Multipliers are positive at an upper bound, negative at a lower one; ``upper`` may be infinite.
     """
     stationarity = H @ v + g + A.T @ row_multipliers + multipliers
     slack_rows = upper_rows - A @ v
@@ -77,26 +75,21 @@ def kkt_residual(
         (at_upper * (upper - v))[bounded],
         at_upper[open_above],
     ]
-    # The sum keeps a NaN that mmax, by comparisons, would drop.
     everything = casadi.vertcat(*parts)
-    return casadi.mmax(everything) + 0 * casadi.sum1(everything)
+    # mmax, by comparisons, would drop a NaN.
+    return casadi.if_else(finite(everything), casadi.mmax(everything), casadi.inf)
+
+
+def finite(values: casadi.MX) -> casadi.MX:
+    """1 when every entry is finite, else 0. (CasADi takes x - x for zero, so that it cannot serve as the test.)"""
+    return casadi.mmin(casadi.fabs(values) < casadi.inf)
 
 
 @contextlib.contextmanager
 def quiet(active: bool) -> Iterator[None]:
-    """Standard output of C code goes nowhere: qpOASES prints its licence from below Python whatever its print level."""
+    """Nothing reaches ``sys.stdout``, through which CasADi prints: qpOASES shows its licence at any print level."""
     if not active:
         yield
         return
-    flush = ctypes.CDLL(None).fflush
-    sys.stdout.flush()
-    flush(None)
-    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 1)
+    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
         yield
-    finally:
-        flush(None)
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(nowhere)

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import threadpool_limits
 
 from ._acquisition import acquisition_named
 from ._fit import FitSettings, fit, import_gpy
@@ -33,7 +34,7 @@ class Optimizer:
     are fitted anew at every ask from starts that do not depend on earlier fits. A search that is rebuilt by
     telling it the stored trials again (which costs next to nothing) goes on with the very point, bit for bit,
     that there would have been; two asks without a tell between give the same point. (On one machine: another
-    linear algebra library, or another number of its threads, may change last bits.)
+    linear algebra library may change last bits.)
 
     Parameters
     ----------
@@ -47,8 +48,8 @@ class Optimizer:
     kernel : {"matern52", "rbf"}
         With one lengthscale a dimension.
     acquisition : {"log_ei", "ei"}
-    transform : {"log", "none"}
-        What is modelled: log J (needs J > 0) or J.
+    transform : {"log-half-rank", "log", "none"}
+        What is modelled: log J with the worse half replaced by its ranks, log J (both need J > 0), or J.
     mean : {"constant", "zero"}
         Learned constant, or zero, of the standardised targets.
     priors : bool
@@ -77,7 +78,7 @@ class Optimizer:
         initial: Sequence[ArrayLike] = (),
         kernel: str = "matern52",
         acquisition: str = "log_ei",
-        transform: str = "log",
+        transform: str = "log-half-rank",
         mean: str = "constant",
         priors: bool = True,
         noise: float | Literal["fitted"] = "fitted",
@@ -182,7 +183,7 @@ class Optimizer:
         self._history.append(trial)
 
     def predict(self, theta: ArrayLike) -> tuple[float, float]:
-        """Return mean and standard deviation of the transformed cost (log J by default), without noise.
+        """Return mean and standard deviation of the transformed cost, without noise; see `transform`.
 
         Raises
         ------
@@ -207,7 +208,8 @@ class Optimizer:
         posterior, aim = self._model()
         fitted = time.perf_counter()
         order = np.argsort(aim.values, kind="stable")[:_INCUMBENTS]
-        unit = maximise(self._acquisition, posterior, aim.best, posterior.points[order], self._generator(1))
+        with threadpool_limits(1):
+            unit = maximise(self._acquisition, posterior, aim.best, posterior.points[order], self._generator(1))
         self._timings = Timings(fitted - start, time.perf_counter() - fitted)
         return self.space.from_unit(unit)
 
@@ -216,7 +218,9 @@ class Optimizer:
         if self._fitted is None or self._fitted[0] != count:
             points = np.array([self.space.to_unit(trial.theta) for trial in self.trials])
             aim = targets(self.trials, self._transform)
-            posterior = fit(points, aim.values, self._fit_settings, self._generator(0))
+            # Matrices this small lose on threads, by a factor of seven on two busy cores, and last bits with them.
+            with threadpool_limits(1):
+                posterior = fit(points, aim.values, self._fit_settings, self._generator(0))
             self._fitted = (count, posterior, aim)
         return self._fitted[1:]
 

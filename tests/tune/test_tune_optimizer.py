@@ -217,7 +217,7 @@ def test_timings_are_those_of_the_last_ask():
     [
         ({"kernel": "linear"}, "unknown kernel 'linear'; known are 'matern52', 'rbf'"),
         ({"acquisition": "ucb"}, "unknown acquisition 'ucb'; known are 'log_ei', 'ei'"),
-        ({"transform": "sqrt"}, "unknown transform 'sqrt'; known are 'log', 'none'"),
+        ({"transform": "sqrt"}, "unknown transform 'sqrt'; known are 'log-half-rank', 'log', 'none'"),
         ({"mean": None}, "unknown mean None; known are 'constant', 'zero'"),
         ({"noise": -1.0}, "noise is -1.0"),
         ({"seed": -1}, "seed is -1"),
