@@ -7,10 +7,13 @@ Ten seed points and a hundred iterations of Bayesian optimisation over the ten n
 
 from socasadi import Circle, Cost, LinearMPC, Modal, Rod, SimulatedPlant, Study
 
-rod = Rod.preset("paper")
-plant = SimulatedPlant(rod, sample_time=0.05, noise=1e-3)
+plant = SimulatedPlant(Rod.preset("paper"), sample_time=0.05, noise=1e-3)
+
+# What the arm's data sheet says, and beam formulas within a factor of two: the box in which theta is sought.
+model = Modal.from_spec(length=0.6, bending_stiffness=0.64, mass_per_length=2.8, cable_offset=0.02)
+
 mpc = LinearMPC(
-    Modal(),
+    model,
     sample_time=0.05,
     horizon=10,
     Q=1e3,

@@ -28,7 +28,7 @@ PARTS = {
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Where the time of the default circle study goes.")
     parser.add_argument("--iterations", type=int, default=100)
     iterations = parser.parse_args().iterations
     study = Path(__file__).with_name("circle.py")

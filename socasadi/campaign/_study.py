@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from numbers import Integral
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -73,7 +74,7 @@ class Study:
                 raise ValueError(f"{name} of the plant is {of_plant}, but {of_mpc} of the MPC; make them equal")
         for name, least in (("seed_points", 1), ("iterations", 0), ("seed", 0), ("verifications", 0)):
             value = getattr(self, name)
-            if not isinstance(value, int) or value < least:
+            if not isinstance(value, Integral) or value < least:
                 raise ValueError(f"{name} is an integer of at least {least}, not {value!r}")
         if not self.time_limit > 0:
             raise ValueError(f"time_limit must be positive, not {self.time_limit} s")

@@ -2,6 +2,7 @@ import functools
 import hashlib
 import os
 import platform
+import shlex
 import shutil
 import subprocess
 import warnings
@@ -19,12 +20,12 @@ class CompilationError(RuntimeError):
     """The C compiler was found but did not accept generated code; the message carries what it said."""
 
 
-def c_compiler() -> str | None:
-    """Path of the C compiler: ``$CC`` when set, else the first of cc, gcc, clang on the PATH; None without one."""
+def c_compiler() -> list[str] | None:
+    """Command of the C compiler: ``$CC``, which may hold arguments, else cc, gcc or clang; None when none is found."""
     chosen = os.environ.get("CC")
-    for name in [chosen] if chosen else ["cc", "gcc", "clang"]:
-        if path := shutil.which(name):
-            return path
+    for command in [shlex.split(chosen)] if chosen else [["cc"], ["gcc"], ["clang"]]:
+        if command and (path := shutil.which(command[0])):
+            return [path, *command[1:]]
     return None
 
 
@@ -53,13 +54,13 @@ def compiled(function: casadi.Function, *, flags: Sequence[str] = ()) -> casadi.
         _warn_interpreted()
         return function
     source = _c_source(function)
-    parts = (source, _compiler_identity(compiler), platform.machine(), *_FLAGS, *flags)
+    parts = (source, *compiler, _compiler_version(compiler[0]), platform.machine(), *_FLAGS, *flags)
     digest = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
     name = f"{function.name()}-{digest}.so"
 
     def build(folder: Path) -> None:
         (folder / "function.c").write_text(source)
-        command = [compiler, *_FLAGS, "function.c", "-o", name, *flags, "-lm"]
+        command = [*compiler, *_FLAGS, "function.c", "-o", name, *flags, "-lm"]
         run = subprocess.run(command, cwd=folder, capture_output=True, text=True)
         if run.returncode:
             raise CompilationError(
@@ -76,8 +77,8 @@ def _c_source(function: casadi.Function) -> str:
 
 
 @functools.cache
-def _compiler_identity(compiler: str) -> str:
-    return subprocess.run([compiler, "--version"], capture_output=True, text=True).stdout
+def _compiler_version(path: str) -> str:
+    return subprocess.run([path, "--version"], capture_output=True, text=True).stdout
 
 
 @functools.cache

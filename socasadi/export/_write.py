@@ -1,6 +1,7 @@
 import dataclasses
 import importlib.metadata
 import platform
+import shlex
 import shutil
 import subprocess
 from collections.abc import Sequence
@@ -112,7 +113,11 @@ def build_and_replay(folder: str | Path) -> str:
             f"the exported controller was not built: no {missing} found; run 'make test' in {folder} where there is one"
         )
     run = subprocess.run(
-        ["make", "-s", f"CC={compiler}", "test"], cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL
+        ["make", "-s", f"CC={shlex.join(compiler)}", "test"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
     )
     if run.returncode:
         raise ExportError(f"'make test' failed in {folder}:\n{(run.stderr + run.stdout).strip()[-2000:]}")

@@ -2,6 +2,7 @@ import functools
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from numbers import Integral
 from typing import NamedTuple, Self
 
 import casadi
@@ -53,7 +54,7 @@ class PredictionModel(ABC):
     def __post_init__(self) -> None:
         for name in ("axes", "inputs"):
             value = getattr(self, name)
-            if not isinstance(value, int) or value < 1:
+            if not isinstance(value, Integral) or value < 1:
                 raise ValueError(f"{name} of {type(self).__name__} is a positive integer, not {value!r}")
         if self.bounds is not None:
             object.__setattr__(self, "bounds", _pairs(self.bounds))

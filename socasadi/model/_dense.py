@@ -1,5 +1,6 @@
 import warnings
 from dataclasses import dataclass
+from numbers import Integral
 
 import casadi
 
@@ -25,7 +26,8 @@ class Dense(PredictionModel):
     Parameters
     ----------
     order
-        Number of states: between ``axes`` and ``2 * axes`` (2 to 4 for the plane).
+        Number of states: between ``axes`` and ``2 * axes`` (2 to 4 for the plane). Only an axis with two states, its
+        output and its rate, can swing; with an order of 3 the second axis has none and just lags.
     feedthrough
         Whether D is free; else it is zero.
 
@@ -48,7 +50,7 @@ class Dense(PredictionModel):
             )
 
     def _default_entries(self) -> tuple[Entry, ...]:
-        if not (isinstance(self.order, int) and self.axes <= self.order <= 2 * self.axes):
+        if not (isinstance(self.order, Integral) and self.axes <= self.order <= 2 * self.axes):
             raise ValueError(
                 f"order of a Dense model with {self.axes} axes lies between {self.axes} and {2 * self.axes}, "
                 f"not {self.order!r}"

@@ -40,11 +40,15 @@ def identify(
     Raises
     ------
     ValueError
-        The record has other numbers of inputs or outputs than the model, or the tensions never change.
+        The record has other numbers of inputs or outputs than the model, or its tensions do not vary independently.
     """
     _check_fit(model, record)
-    if np.ptp(record.tension, axis=0).max() == 0:
-        raise ValueError("nothing can be identified from a record whose tensions never change")
+    varied = np.linalg.matrix_rank(record.tension - record.tension.mean(axis=0))
+    if varied < model.inputs:
+        raise ValueError(
+            f"the record's tensions vary in {varied} independent ways, but gains of {model.inputs} inputs are sought: "
+            "move every cable on its own, as probe() does"
+        )
     scale = _Scale(model)
     limit = 1e3 * max(np.ptp(record.output), 1e-6)
 

@@ -43,7 +43,7 @@ class Modal(PredictionModel):
         into an arc, towards its own angle, and moves the tip by :math:`g = d L^2 / (2 EI)` a newton. The bounds
         allow for a frequency that is off by a factor of ``margin`` either way, and for gains that are off by
         :math:`(1 - 1/margin) g`: with the default, cables half or one and a half times as strong as the data sheet
-        has them, or 30 degrees off their angle.
+        has them, or about 30 degrees off their angle.
 
         Parameters
         ----------

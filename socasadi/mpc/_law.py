@@ -4,10 +4,14 @@ import casadi
 import numpy as np
 
 from ._design import Design
-from ._qp import KKT_TOLERANCE, finite, kkt_residual, qp_solver
+from ._qp import KKT_TOLERANCE, below, finite, kkt_residual, qp_solver
 
 if TYPE_CHECKING:
     from ._spec import LinearMPC
+
+
+# No tip is there, m; a spike beyond would blind the observer for as long as it takes to decay.
+_FARTHEST = 1e3
 
 
 def control_law(mpc: "LinearMPC", design: Design, *, with_qp: bool = True) -> casadi.Function:
@@ -17,10 +21,10 @@ def control_law(mpc: "LinearMPC", design: Design, *, with_qp: bool = True) -> ca
     row, state = (x, d, v) after the last sample, u (m,) N inside its bounds, status 0 for the QP's answer, 1 for the
     clipped unconstrained law, 2 for the held input, and the KKT residual.
 
-    The state is predicted with the input that was applied and corrected by y; a y that is not finite corrects nothing.
-    An answer of the QP is believed when its KKT residual is at most 1e-6. Else the unconstrained law is applied,
-    clipped to the bounds, and when that is not finite either, the input before. With ``with_qp=False`` the QP is left
-    out: this Function takes over where the solver itself gives up.
+    The state is predicted with the input that was applied and corrected by y; a y that cannot be (not a number, or a
+    kilometre and more) corrects nothing. An answer of the QP is believed when its KKT residual is at most 1e-6. Else
+    the unconstrained law is applied, clipped to the bounds, and when that is not finite either, the input before. With
+    ``with_qp=False`` the QP is left out: this Function takes over where the solver itself gives up.
     """
     n, m, p, N = len(design.A), mpc.inputs, mpc.outputs, mpc.horizon
     y, reference = casadi.MX.sym("y", p), casadi.MX.sym("reference", N * p)  # pyright: ignore
@@ -30,7 +34,7 @@ def control_law(mpc: "LinearMPC", design: Design, *, with_qp: bool = True) -> ca
 
     x = design.A @ x + design.B @ v_before
     innovation = y - (design.C @ x + design.D @ v_before + d)
-    innovation = casadi.if_else(finite(y), innovation, casadi.DM.zeros(p))
+    innovation = casadi.if_else(below(y, _FARTHEST), innovation, casadi.DM.zeros(p))
     x, d = x + design.state_gain @ innovation, d + design.disturbance_gain @ innovation
     parameters = casadi.vertcat(x, d, v_before, reference, 1)
 

@@ -57,7 +57,8 @@ def kkt_residual(
     """Largest violation of the optimality conditions of min v'Hv/2 + g'v, lower <= v <= upper, A v <= upper_rows.
 
     Stationarity (relative to 1 + max |g|), feasibility, signs of the multipliers and complementarity; infinite when
-    the answer is not finite. Multipliers are positive at an upper bound, negative at a lower one; ``upper`` may be infinite.
+    the answer is not finite. Multipliers are positive at an upper bound, negative at a lower one; ``upper`` may hold
+    infinities.
     """
     stationarity = H @ v + g + A.T @ row_multipliers + multipliers
     slack_rows = upper_rows - A @ v
@@ -82,7 +83,12 @@ def kkt_residual(
 
 def finite(values: casadi.MX) -> casadi.MX:
     """1 when every entry is finite, else 0. (CasADi takes x - x for zero, so that it cannot serve as the test.)"""
-    return casadi.mmin(casadi.fabs(values) < casadi.inf)
+    return below(values, casadi.inf)
+
+
+def below(values: casadi.MX, limit: float) -> casadi.MX:
+    """1 when every entry is a number of magnitude less than ``limit``, else 0."""
+    return casadi.mmin(casadi.fabs(values) < limit)
 
 
 @contextlib.contextmanager

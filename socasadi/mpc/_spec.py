@@ -1,5 +1,6 @@
 import functools
 from dataclasses import dataclass
+from numbers import Integral
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -81,7 +82,7 @@ class LinearMPC:
     def __post_init__(self) -> None:
         if not isinstance(self.model, PredictionModel):
             raise TypeError(f"model is a prediction-model family such as Modal(), not {self.model!r}")
-        if not isinstance(self.horizon, int) or self.horizon < 1:
+        if not isinstance(self.horizon, Integral) or self.horizon < 1:
             raise ValueError(f"horizon is a positive number of samples, not {self.horizon!r}")
         for name in ("sample_time", "slack_weight", "measurement_noise", "input_noise", "disturbance_noise"):
             value = getattr(self, name)

@@ -61,10 +61,10 @@ def test_the_same_function_is_compiled_once(monkeypatch, empty_cache):
     commands = []
     run = subprocess.run
     monkeypatch.setattr(internals.subprocess, "run", lambda command, **k: commands.append(command) or run(command, **k))
-    internals._compiler_identity.cache_clear()
+    internals._compiler_version.cache_clear()
     compiled(wave())
     assert sum("function.c" in command for command in commands) == 1
-    internals._compiler_identity.cache_clear()
+    internals._compiler_version.cache_clear()
     again = compiled(wave())
     assert sum("function.c" in command for command in commands) == 1
     assert float(again([0.5, 0])[0]) == pytest.approx(sin(0.5), rel=1e-14)
@@ -110,12 +110,12 @@ def test_without_a_compiler_the_function_itself_is_returned_and_it_is_said_once(
         assert compiled(function) is function
 
 
-def test_the_compiler_named_by_CC_comes_first(monkeypatch, tmp_path):
+def test_the_compiler_named_by_CC_comes_first_with_its_arguments(monkeypatch, tmp_path):
     own = tmp_path / "mycc"
     own.write_text("#!/bin/sh\n")
     own.chmod(stat.S_IRWXU)
-    monkeypatch.setenv("CC", str(own))
-    assert c_compiler() == str(own)
+    monkeypatch.setenv("CC", f"{own} -O1")
+    assert c_compiler() == [str(own), "-O1"]
 
 
 def test_a_compiler_that_refuses_is_quoted_and_leaves_nothing_behind(monkeypatch, tmp_path, empty_cache):

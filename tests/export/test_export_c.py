@@ -77,6 +77,7 @@ int main(void) {
     const double none[CONTROLLER_INPUTS] = {0};
     controller self;
     long t, outside = 0;
+    int status = -1;
     controller_init(&self);
     for (t = 0; t < 2000; ++t) {
         int i;
@@ -86,20 +87,28 @@ int main(void) {
         controller_step(&self, y, r, u);
         for (i = 0; i < CONTROLLER_INPUTS; ++i) outside += !(u[i] >= -10.0 && u[i] <= 10.0);
     }
-    printf("%ld %d %d\n", outside, self.unseen > 0, self.held > 0);
+    printf("%ld %d ", outside, self.held > 0);
+    /* Afterwards it works as before: the strange samples have blinded nothing. */
+    for (t = 0; t < 100; ++t) {
+        int i;
+        for (i = 0; i < CONTROLLER_OUTPUTS; ++i) y[i] = 0.0;
+        for (i = 0; i < CONTROLLER_HORIZON * CONTROLLER_OUTPUTS; ++i) r[i] = 0.0;
+        status = controller_step(&self, y, r, u);
+    }
+    printf("%d\n", status);
     return 0;
 }
 """
 
 
 @with_compiler
-def test_whatever_comes_in_the_tensions_are_finite_and_inside_their_bounds(folder):
+def test_whatever_comes_in_the_tensions_stay_inside_their_bounds_and_nothing_is_spoilt(folder):
     (folder / "hostile.c").write_text(HOSTILE)
     build_and_replay(folder)
     compiler = ["cc", "-std=c99", "-O1", "-I.", "-Iosqp/include", "hostile.c", "libcontroller.a"]
     subprocess.run([*compiler, "osqp/libosqpstatic.a", "-lm", "-o", "hostile"], cwd=folder, check=True)
     said = subprocess.run(["./hostile"], cwd=folder, capture_output=True, text=True, check=True).stdout
-    assert said.split() == ["0", "1", "1"]
+    assert said.split() == ["0", "1", "0"]
 
 
 def test_the_header_says_where_the_controller_comes_from(folder):

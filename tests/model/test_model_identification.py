@@ -142,8 +142,15 @@ def test_a_record_of_other_counts_is_refused():
             use()
 
 
+def test_gains_of_cables_that_did_not_move_on_their_own_are_not_identified():
+    alone = np.zeros((50, 3))
+    alone[:, 0] = np.random.default_rng(1).normal(size=50)
+    with pytest.raises(ValueError, match="vary in 1 independent ways"):
+        identify(Modal(), Record(T, alone, np.random.default_rng(0).normal(size=(51, 2))))
+
+
 def test_nothing_is_identified_from_tensions_that_never_change():
-    with pytest.raises(ValueError, match="tensions never change"):
+    with pytest.raises(ValueError, match="vary in 0 independent ways"):
         identify(Modal(), Record(T, np.full((50, 3), 2.0), np.random.default_rng(0).normal(size=(51, 2))))
 
 

@@ -35,7 +35,7 @@ void controller_reset(controller *self, const double u_before[CONTROLLER_INPUTS]
         for (i = 0; i < CONTROLLER_MODEL_ORDER; ++i) self->state[i] += controller_rest[i][j] * v;
         self->state[LAST_INPUT + j] = v;
     }
-    self->steps = self->unseen = self->clipped = self->held = 0;
+    self->steps = self->clipped = self->held = 0;
     self->residual = 0.0;
 }
 
@@ -57,11 +57,9 @@ int controller_step(controller *self, const double y[CONTROLLER_OUTPUTS],
     if (!all_finite(r, CONTROLLER_HORIZON * CONTROLLER_OUTPUTS) || law(arguments, results, 0, work, self->solver))
         law_without_qp(arguments, results, 0, work, 0);
     self->steps += 1;
-    self->unseen += !all_finite(y, CONTROLLER_OUTPUTS);
     self->clipped += status == CONTROLLER_CLIPPED;
     self->held += status == CONTROLLER_HELD;
     self->residual = residual;
-    /* Only a state that is finite is kept: one bad sample must not blind the observer for good. */
     if (all_finite(next, CONTROLLER_STATES)) memcpy(self->state, next, sizeof next);
     return (int)status;
 }

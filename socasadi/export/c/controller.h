@@ -7,7 +7,8 @@
  *
  * y is measured now, after the last u has been held for one sample; u is to be held until the next call. Row k of r
  * (row after row, CONTROLLER_OUTPUTS numbers each) is wanted k + 1 samples from now. Metres and newtons.
- * Whatever comes in, u is finite and inside its bounds.
+ * Whatever comes in, u is finite and inside its bounds. A y that is not finite, or 1e3 and more, corrects nothing: the
+ * observer then only predicts.
  */
 #ifndef CONTROLLER_H
 #define CONTROLLER_H
@@ -27,7 +28,6 @@ enum controller_status {
 typedef struct {
     double state[CONTROLLER_STATES];
     unsigned long steps;
-    unsigned long unseen;  /* how often y was not finite; the observer then predicts and corrects nothing */
     unsigned long clipped; /* how often the clipped law was applied */
     unsigned long held;    /* how often the tensions before were held */
     double residual;       /* KKT residual of the last answer */
