@@ -1,4 +1,4 @@
-import casadi
+import casadi as ca
 import numpy as np
 
 
@@ -9,7 +9,7 @@ class Buffered:
     forty when CasADi converts arguments and results.
     """
 
-    def __init__(self, function: casadi.Function) -> None:
+    def __init__(self, function: ca.Function) -> None:
         self._inputs = [np.zeros(function.nnz_in(i)) for i in range(function.n_in())]
         self._outputs = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
         self._buffer, self._evaluate = function.buffer()

@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-import casadi
+import casadi as ca
 
 from ._cache import cached_file
 
@@ -29,7 +29,7 @@ def c_compiler() -> list[str] | None:
     return None
 
 
-def compiled(function: casadi.Function, *, flags: Sequence[str] = ()) -> casadi.Function:
+def compiled(function: ca.Function, *, flags: Sequence[str] = ()) -> ca.Function:
     """The same Function as machine code.
 
     The C that CasADi generates for ``function`` is compiled to a shared library, which is kept in
@@ -67,11 +67,11 @@ def compiled(function: casadi.Function, *, flags: Sequence[str] = ()) -> casadi.
                 f"{' '.join(command)} failed on the C of {function.name()!r}:\n{run.stderr.strip()[:2000]}"
             )
 
-    return casadi.external(function.name(), str(cached_file(name, build)))
+    return ca.external(function.name(), str(cached_file(name, build)))
 
 
-def _c_source(function: casadi.Function) -> str:
-    generator = casadi.CodeGenerator(f"{function.name()}.c")
+def _c_source(function: ca.Function) -> str:
+    generator = ca.CodeGenerator(f"{function.name()}.c")
     generator.add(function)
     return generator.dump()
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
-import casadi
+import casadi as ca
 import jinja2
 import numpy as np
 
@@ -56,7 +56,7 @@ def export(record: ControllerRecord, folder: str | Path, *, real: str = "double"
     mpc = dataclasses.replace(record.mpc, backend="osqp")
     design = mpc.design(record.system)
 
-    laws = casadi.CodeGenerator("law.c", {"with_header": True})
+    laws = ca.CodeGenerator("law.c", {"with_header": True})
     qp_law, plain_law = control_law(mpc, design), control_law(mpc, design, with_qp=False)
     laws.add(qp_law)
     laws.add(plain_law)
@@ -126,7 +126,7 @@ def build_and_replay(folder: str | Path) -> str:
 
 def _copy_osqp(folder: Path) -> str:
     """Headers and static library of OSQP, as the casadi package holds them; returns OSQP's version."""
-    package = Path(casadi.__file__).parent
+    package = Path(ca.__file__).parent
     library, headers = package / "libosqpstatic.a", package / "include" / "osqp"
     if not library.exists() or not headers.is_dir():
         raise ExportError(f"this build of casadi has no static OSQP library in {package}; install casadi from PyPI")

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from numbers import Integral
 from typing import NamedTuple, Self
 
-import casadi
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -69,7 +69,7 @@ class PredictionModel(ABC):
     def _default_entries(self) -> tuple[Entry, ...]: ...
 
     @abstractmethod
-    def _matrices(self, theta: casadi.SX, sample_time: float) -> tuple[casadi.SX, ...]: ...
+    def _matrices(self, theta: ca.SX, sample_time: float) -> tuple[ca.SX, ...]: ...
 
     @functools.cached_property
     def entries(self) -> tuple[Entry, ...]:
@@ -105,13 +105,13 @@ class PredictionModel(ABC):
         return values
 
     @functools.lru_cache(maxsize=32)  # noqa: B019 (a family is a small value; building its Function costs a millisecond)
-    def matrices(self, sample_time: float) -> casadi.Function:
+    def matrices(self, sample_time: float) -> ca.Function:
         """CasADi Function theta (size,) -> A, B, C, D of the model sampled at ``sample_time`` s."""
         if not (np.isfinite(sample_time) and sample_time > 0):
             raise ValueError(f"sample_time must be positive, not {sample_time} s")
-        theta = casadi.SX.sym("theta", self.size)  # pyright: ignore[reportArgumentType]
-        outputs = [casadi.densify(matrix) for matrix in self._matrices(theta, float(sample_time))]
-        return casadi.Function("matrices", [theta], outputs, ["theta"], ["A", "B", "C", "D"])
+        theta = ca.SX.sym("theta", self.size)  # pyright: ignore[reportArgumentType]
+        outputs = [ca.densify(matrix) for matrix in self._matrices(theta, float(sample_time))]
+        return ca.Function("matrices", [theta], outputs, ["theta"], ["A", "B", "C", "D"])
 
     def state_space(self, theta: ArrayLike, sample_time: float) -> StateSpace:
         """The model of one theta as arrays."""

@@ -2,7 +2,7 @@ import warnings
 from dataclasses import dataclass
 from numbers import Integral
 
-import casadi
+import casadi as ca
 
 from ._base import PredictionModel
 from ._entry import Entry
@@ -87,17 +87,17 @@ class Dense(PredictionModel):
             case _:
                 return Entry(name, "1/s", -2.0, 2.0)
 
-    def _matrices(self, theta: casadi.SX, sample_time: float) -> tuple[casadi.SX, ...]:
+    def _matrices(self, theta: ca.SX, sample_time: float) -> tuple[ca.SX, ...]:
         n, m, p = self.order, self.inputs, self.axes
         rates = n - p
-        sign = casadi.DM([-1.0 if entry.name.startswith("-") else 1.0 for entry in self.entries])
-        free_A, free_B, free_D = casadi.vertsplit(theta * sign, [0, n * p, n * p + n * m, self.size])
-        links = casadi.horzcat(casadi.SX(rates, p), casadi.SX.eye(rates))
-        A = casadi.SX.eye(n) + sample_time * casadi.vertcat(links, _rows(free_A, p, n))
+        sign = ca.DM([-1.0 if entry.name.startswith("-") else 1.0 for entry in self.entries])
+        free_A, free_B, free_D = ca.vertsplit(theta * sign, [0, n * p, n * p + n * m, self.size])
+        links = ca.horzcat(ca.SX(rates, p), ca.SX.eye(rates))
+        A = ca.SX.eye(n) + sample_time * ca.vertcat(links, _rows(free_A, p, n))
         B = sample_time * _rows(free_B, n, m)
-        C = casadi.horzcat(casadi.SX.eye(p), casadi.SX(p, rates))
-        return A, B, C, _rows(free_D, p, m) if self.feedthrough else casadi.SX(p, m)
+        C = ca.horzcat(ca.SX.eye(p), ca.SX(p, rates))
+        return A, B, C, _rows(free_D, p, m) if self.feedthrough else ca.SX(p, m)
 
 
-def _rows(values: casadi.SX, rows: int, columns: int) -> casadi.SX:
-    return casadi.reshape(values, columns, rows).T
+def _rows(values: ca.SX, rows: int, columns: int) -> ca.SX:
+    return ca.reshape(values, columns, rows).T

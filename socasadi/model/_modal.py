@@ -2,7 +2,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import casadi
+import casadi as ca
 
 from ._base import PredictionModel
 from ._entry import Entry
@@ -91,17 +91,17 @@ class Modal(PredictionModel):
             entries += [Entry(f"gain_{axis}{j + 1}", "m/N", -0.012, 0.012) for j in range(self.inputs)]
         return tuple(entries)
 
-    def _matrices(self, theta: casadi.SX, sample_time: float) -> tuple[casadi.SX, ...]:
-        per_axis = casadi.reshape(theta, 2 + self.inputs, self.axes)
+    def _matrices(self, theta: ca.SX, sample_time: float) -> tuple[ca.SX, ...]:
+        per_axis = ca.reshape(theta, 2 + self.inputs, self.axes)
         A, B, C = [], [], []
         for i in range(self.axes):
             frequency, ratio, gains = per_axis[0, i], per_axis[1, i], per_axis[2:, i].T
             block = _oscillator(frequency, ratio, sample_time)
             A.append(block)
             # A constant input makes gain * u the rest position, so that B = (I - A) times the rest state per input.
-            B.append((casadi.SX.eye(2) - block)[:, 0] @ gains)
-            C.append(casadi.SX([[1, 0]]))
-        return casadi.diagcat(*A), casadi.vertcat(*B), casadi.diagcat(*C), casadi.SX(self.axes, self.inputs)
+            B.append((ca.SX.eye(2) - block)[:, 0] @ gains)
+            C.append(ca.SX([[1, 0]]))
+        return ca.diagcat(*A), ca.vertcat(*B), ca.diagcat(*C), ca.SX(self.axes, self.inputs)
 
 
 def axis_names(count: int) -> list[str]:
@@ -109,18 +109,18 @@ def axis_names(count: int) -> list[str]:
     return ["y", "z"][:count] if count <= 2 else [str(i + 1) for i in range(count)]
 
 
-def _oscillator(frequency: casadi.SX, ratio: casadi.SX, time: float) -> casadi.SX:
+def _oscillator(frequency: ca.SX, ratio: ca.SX, time: float) -> ca.SX:
     """exp(A t) of a damped oscillator in position and velocity, for any damping ratio above 0."""
     decay = ratio * frequency
     # (1 - ratio^2) is kept away from zero: at critical damping the two forms meet and the error is below 1e-9.
     gap = 1 - ratio**2
-    gap = casadi.if_else(casadi.fabs(gap) < 1e-10, 1e-10, gap)
-    swing = frequency * casadi.sqrt(casadi.fabs(gap))
+    gap = ca.if_else(ca.fabs(gap) < 1e-10, 1e-10, gap)
+    swing = frequency * ca.sqrt(ca.fabs(gap))
     under = ratio < 1
-    cosine = casadi.if_else(under, casadi.cos(swing * time), casadi.cosh(swing * time))
-    sine = casadi.if_else(under, casadi.sin(swing * time), casadi.sinh(swing * time)) / swing
-    rows = casadi.vertcat(
-        casadi.horzcat(cosine + decay * sine, sine),
-        casadi.horzcat(-(frequency**2) * sine, cosine - decay * sine),
+    cosine = ca.if_else(under, ca.cos(swing * time), ca.cosh(swing * time))
+    sine = ca.if_else(under, ca.sin(swing * time), ca.sinh(swing * time)) / swing
+    rows = ca.vertcat(
+        ca.horzcat(cosine + decay * sine, sine),
+        ca.horzcat(-(frequency**2) * sine, cosine - decay * sine),
     )
-    return casadi.exp(-decay * time) * rows
+    return ca.exp(-decay * time) * rows

@@ -1,18 +1,18 @@
 from typing import NamedTuple
 
-import casadi
+import casadi as ca
 
 
 class Prediction(NamedTuple):
     """Outputs and last state as linear maps of the first state and the inputs (see :func:`predict`)."""
 
-    output_free: casadi.MX
-    output_forced: casadi.MX
-    last_free: casadi.MX
-    last_forced: casadi.MX
+    output_free: ca.MX
+    output_forced: ca.MX
+    last_free: ca.MX
+    last_forced: ca.MX
 
 
-def predict(A: casadi.MX, B: casadi.MX, C: casadi.MX, D: casadi.MX, horizon: int) -> Prediction:
+def predict(A: ca.MX, B: ca.MX, C: ca.MX, D: ca.MX, horizon: int) -> Prediction:
     r"""The horizon's outputs without its states ("condensing").
 
     With :math:`x_{k+1} = A x_k + B v_k` and :math:`y_{k+1} = C x_{k+1} + D v_k`, the stacks
@@ -23,19 +23,17 @@ def predict(A: casadi.MX, B: casadi.MX, C: casadi.MX, D: casadi.MX, horizon: int
     where block row k of :math:`\Phi` is :math:`C A^k`, and block (k, j) of :math:`\Gamma` is
     :math:`C A^{k-1-j} B` for j < k, plus D on the diagonal j = k - 1.
     """
-    powers = [casadi.MX.eye(A.shape[0])]
+    powers = [ca.MX.eye(A.shape[0])]
     for _ in range(horizon):
         powers.append(A @ powers[-1])
     forced = [power @ B for power in powers[:-1]]
     markov = [C @ block for block in forced]
     markov[0] += D
-    zero = casadi.MX(C.shape[0], B.shape[1])
-    rows = [
-        casadi.horzcat(*[markov[k - 1 - j] if j < k else zero for j in range(horizon)]) for k in range(1, horizon + 1)
-    ]
+    zero = ca.MX(C.shape[0], B.shape[1])
+    rows = [ca.horzcat(*[markov[k - 1 - j] if j < k else zero for j in range(horizon)]) for k in range(1, horizon + 1)]
     return Prediction(
-        output_free=casadi.vertcat(*[C @ power for power in powers[1:]]),
-        output_forced=casadi.vertcat(*rows),
+        output_free=ca.vertcat(*[C @ power for power in powers[1:]]),
+        output_forced=ca.vertcat(*rows),
         last_free=powers[-1],
-        last_forced=casadi.horzcat(*reversed(forced)),
+        last_forced=ca.horzcat(*reversed(forced)),
     )

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
-import casadi
+import casadi as ca
 import numpy as np
 
 from ._condense import predict
@@ -47,7 +47,7 @@ class Design:
     """(m, len(p)) first input of the unconstrained problem."""
 
     @classmethod
-    def checked(cls, numbers: Sequence[casadi.DM]) -> Self:
+    def checked(cls, numbers: Sequence[ca.DM]) -> Self:
         """The design of evaluated outputs of :func:`design_function`; DesignError when it is none."""
         *arrays, residual, observer = (np.asarray(value.full()) for value in numbers)
         design = cls(*arrays)
@@ -68,134 +68,130 @@ class Design:
         return design
 
 
-def design_function(mpc: "LinearMPC", order: int) -> casadi.Function:
+def design_function(mpc: "LinearMPC", order: int) -> ca.Function:
     """CasADi Function (A, B, C, D) -> fields of :class:`Design`, a Riccati residual, the observer's error dynamics."""
     n, m, p, N = order, mpc.inputs, mpc.outputs, mpc.horizon
-    A, C = casadi.MX.sym("A", n, n), casadi.MX.sym("C", p, n)  # pyright: ignore
-    B_newton, D_newton = casadi.MX.sym("B", n, m), casadi.MX.sym("D", p, m)  # pyright: ignore
-    scale = casadi.diag(casadi.DM(mpc.input_scale))
+    A, C = ca.MX.sym("A", n, n), ca.MX.sym("C", p, n)  # pyright: ignore
+    B_newton, D_newton = ca.MX.sym("B", n, m), ca.MX.sym("D", p, m)  # pyright: ignore
+    scale = ca.diag(ca.DM(mpc.input_scale))
     B, D = B_newton @ scale, D_newton @ scale
-    Q = casadi.MX(weight_matrix(mpc.Q, p, "Q"))
+    Q = ca.MX(weight_matrix(mpc.Q, p, "Q"))
     on_input, on_rate = _input_weights(mpc)
 
-    rest = casadi.solve(casadi.MX.eye(n) - A, B)
+    rest = ca.solve(ca.MX.eye(n) - A, B)
     lower, upper = (limit / mpc.input_scale for limit in mpc.input_limits)
-    v_0, v_reference = steady_target(C @ rest + D, Q, on_input, casadi.DM((lower + upper) / 2))
-    noise = casadi.DM.ones(p) * mpc.measurement_noise
+    v_0, v_reference = steady_target(C @ rest + D, Q, on_input, ca.DM((lower + upper) / 2))
+    noise = ca.DM.ones(p) * mpc.measurement_noise
     state_gain, disturbance_gain = kalman_gain(A, B_newton, C, mpc.input_noise, mpc.disturbance_noise, noise)
-    extended = casadi.diagcat(A, casadi.MX.eye(p))
-    error_dynamics = (
-        extended - casadi.vertcat(state_gain, disturbance_gain) @ casadi.horzcat(C, casadi.MX.eye(p)) @ extended
-    )
+    extended = ca.diagcat(A, ca.MX.eye(p))
+    error_dynamics = extended - ca.vertcat(state_gain, disturbance_gain) @ ca.horzcat(C, ca.MX.eye(p)) @ extended
 
     # Blocks of p = (x, d, v_{-1}, r_1 ... r_N, 1): each linear map below is written as one row of such blocks.
     widths = {"x": n, "d": p, "v": m, "r": N * p, "one": 1}
 
-    def maps(rows: int, **blocks: casadi.MX) -> casadi.MX:
-        return casadi.horzcat(*[blocks.get(name, casadi.MX(rows, width)) for name, width in widths.items()])
+    def maps(rows: int, **blocks: ca.MX) -> ca.MX:
+        return ca.horzcat(*[blocks.get(name, ca.MX(rows, width)) for name, width in widths.items()])
 
     prediction = predict(A, B, C, D, N)
-    repeated_d = casadi.repmat(casadi.MX.eye(p), N, 1)
+    repeated_d = ca.repmat(ca.MX.eye(p), N, 1)
     difference = _difference(N, m)
-    first = casadi.vertcat(casadi.MX.eye(m), casadi.MX((N - 1) * m, m))
-    last = casadi.horzcat(casadi.MX(m, (N - 1) * m), casadi.MX.eye(m))
+    first = ca.vertcat(ca.MX.eye(m), ca.MX((N - 1) * m, m))
+    last = ca.horzcat(ca.MX(m, (N - 1) * m), ca.MX.eye(m))
 
     # Each term of the cost is |linear in V + linear in p|^2 with a weight: (forced, free, weight).
     terms = [
         (
             prediction.output_forced,
-            maps(N * p, x=prediction.output_free, d=repeated_d, r=-casadi.MX.eye(N * p)),
-            casadi.kron(casadi.DM.eye(N), Q),
+            maps(N * p, x=prediction.output_free, d=repeated_d, r=-ca.MX.eye(N * p)),
+            ca.kron(ca.DM.eye(N), Q),
         ),
-        (difference, maps(N * m, v=-first), casadi.kron(casadi.DM.eye(N), on_rate)),
-        (casadi.MX.eye(N * m), maps(N * m), casadi.kron(casadi.DM.eye(N), on_input)),
+        (difference, maps(N * m, v=-first), ca.kron(ca.DM.eye(N), on_rate)),
+        (ca.MX.eye(N * m), maps(N * m), ca.kron(ca.DM.eye(N), on_input)),
     ]
-    residual, price = casadi.MX(0), casadi.MX(n, sum(widths.values()))
+    residual, price = ca.MX(0), ca.MX(n, sum(widths.values()))
     if mpc.terminal == "riccati":
         cost_to_go, residual = _cost_to_go(A, B, C, D, Q, on_input, on_rate)
-        newest = casadi.horzcat(casadi.MX(p, (N - 1) * p), casadi.MX.eye(p))
+        newest = ca.horzcat(ca.MX(p, (N - 1) * p), ca.MX.eye(p))
         target_r, target_d, target_1 = v_reference @ newest, -v_reference, v_0
-        free = casadi.vertcat(
+        free = ca.vertcat(
             maps(n, x=prediction.last_free, d=-rest @ target_d, r=-rest @ target_r, one=-rest @ target_1),
             maps(m, d=-target_d, r=-target_r, one=-target_1),
         )
-        terms.append((casadi.vertcat(prediction.last_forced, last), free, cost_to_go))
-        off_target = (C @ rest + D) @ maps(m, d=target_d, r=target_r, one=target_1) + maps(
-            p, d=casadi.MX.eye(p), r=-newest
-        )
-        price = casadi.solve(casadi.MX.eye(n) - A.T, C.T @ Q @ off_target)
+        terms.append((ca.vertcat(prediction.last_forced, last), free, cost_to_go))
+        off_target = (C @ rest + D) @ maps(m, d=target_d, r=target_r, one=target_1) + maps(p, d=ca.MX.eye(p), r=-newest)
+        price = ca.solve(ca.MX.eye(n) - A.T, C.T @ Q @ off_target)
 
-    hessian = 2 * sum((forced.T @ weight @ forced for forced, _, weight in terms), casadi.MX(N * m, N * m))
+    hessian = 2 * sum((forced.T @ weight @ forced for forced, _, weight in terms), ca.MX(N * m, N * m))
     gradient = 2 * sum(
         (forced.T @ weight @ free for forced, free, weight in terms),
         # Where the target is off the reference, as a weight on the input itself makes it, the cost-to-go has a slope.
         prediction.last_forced.T @ A.T @ price,
     )
-    law = -casadi.solve(hessian, gradient)[:m, :]
-    rows, row_bounds = casadi.MX(0, N * m), casadi.MX(0, sum(widths.values()))
+    law = -ca.solve(hessian, gradient)[:m, :]
+    rows, row_bounds = ca.MX(0, N * m), ca.MX(0, sum(widths.values()))
     if mpc.output_limits is not None:
-        y_lower, y_upper = (casadi.repmat(casadi.DM(limit), N, 1) for limit in mpc.output_limits)
+        y_lower, y_upper = (ca.repmat(ca.DM(limit), N, 1) for limit in mpc.output_limits)
         largest = float(np.max(np.abs(mpc.output_limits)))
-        slack = -casadi.MX.eye(N * p)
+        slack = -ca.MX.eye(N * p)
         forced, free = (
             prediction.output_forced / largest,
             maps(N * p, x=prediction.output_free, d=repeated_d) / largest,
         )
-        rows = casadi.vertcat(casadi.horzcat(forced, slack), casadi.horzcat(-forced, slack))
-        row_bounds = casadi.vertcat(
-            maps(N * p, one=casadi.MX(y_upper / largest)) - free,
-            free - maps(N * p, one=casadi.MX(y_lower / largest)),
+        rows = ca.vertcat(ca.horzcat(forced, slack), ca.horzcat(-forced, slack))
+        row_bounds = ca.vertcat(
+            maps(N * p, one=ca.MX(y_upper / largest)) - free,
+            free - maps(N * p, one=ca.MX(y_lower / largest)),
         )
-        hessian = casadi.diagcat(hessian, 2 * mpc.slack_weight * largest**2 * casadi.MX.eye(N * p))
-        gradient = casadi.vertcat(gradient, casadi.MX(N * p, sum(widths.values())))
+        hessian = ca.diagcat(hessian, 2 * mpc.slack_weight * largest**2 * ca.MX.eye(N * p))
+        gradient = ca.vertcat(gradient, ca.MX(N * p, sum(widths.values())))
 
     outputs = [A, B, C, D, rest, state_gain, disturbance_gain, hessian, gradient, rows, row_bounds, law]
-    return casadi.Function(
+    return ca.Function(
         "design",
         [A, B_newton, C, D_newton],
-        [casadi.densify(o) for o in (*outputs, residual, error_dynamics)],
+        [ca.densify(o) for o in (*outputs, residual, error_dynamics)],
     )
 
 
-def _input_weights(mpc: "LinearMPC") -> tuple[casadi.MX, casadi.MX]:
+def _input_weights(mpc: "LinearMPC") -> tuple[ca.MX, ca.MX]:
     """Weights (m, m) of v and of its change from sample to sample."""
-    weight, none = casadi.MX(weight_matrix(mpc.R, mpc.inputs, "R")), casadi.MX(mpc.inputs, mpc.inputs)
+    weight, none = ca.MX(weight_matrix(mpc.R, mpc.inputs, "R")), ca.MX(mpc.inputs, mpc.inputs)
     match mpc.input_term:
         case "rate":
             return none, weight
         case "normalised":
             return weight, none
         case "literal":
-            scale = casadi.diag(casadi.DM(mpc.input_scale))
+            scale = ca.diag(ca.DM(mpc.input_scale))
             return scale @ weight @ scale, none
 
 
-def _difference(horizon: int, inputs: int) -> casadi.MX:
+def _difference(horizon: int, inputs: int) -> ca.MX:
     """Maps (v_0 ... v_{N-1}) to the changes between them; the first lacks its -v_{-1}."""
     one_back = np.eye(horizon, k=-1)
-    return casadi.MX(casadi.DM(np.kron(np.eye(horizon) - one_back, np.eye(inputs))))
+    return ca.MX(ca.DM(np.kron(np.eye(horizon) - one_back, np.eye(inputs))))
 
 
 def _cost_to_go(
-    A: casadi.MX,
-    B: casadi.MX,
-    C: casadi.MX,
-    D: casadi.MX,
-    Q: casadi.MX,
-    on_input: casadi.MX,
-    on_rate: casadi.MX,
-) -> tuple[casadi.MX, casadi.MX]:
+    A: ca.MX,
+    B: ca.MX,
+    C: ca.MX,
+    D: ca.MX,
+    Q: ca.MX,
+    on_input: ca.MX,
+    on_rate: ca.MX,
+) -> tuple[ca.MX, ca.MX]:
     """Weight of (x_N - x_s, v_{N-1} - v_s) beyond the horizon, and the relative residual of its Riccati equation.
 
     The state is the model's with the last input beside it, since that decides both the output y_N (through D) and the
     first change of the input. What y_N itself costs is already in the horizon's sum and is taken off.
     """
     n, m = B.shape
-    state = casadi.diagcat(A, casadi.MX(m, m))
-    entry = casadi.vertcat(B, casadi.MX.eye(m))
-    output = casadi.horzcat(C, D)
+    state = ca.diagcat(A, ca.MX(m, m))
+    entry = ca.vertcat(B, ca.MX.eye(m))
+    output = ca.horzcat(C, D)
     stage = output.T @ Q @ output
-    before = casadi.horzcat(casadi.MX(m, n), casadi.MX.eye(m))
+    before = ca.horzcat(ca.MX(m, n), ca.MX.eye(m))
     weight_state, weight_input, cross = (
         stage + before.T @ on_rate @ before,
         on_input + on_rate,
@@ -203,5 +199,5 @@ def _cost_to_go(
     )
     P = riccati(state, entry, weight_state, weight_input, cross)
     mixed = state.T @ P @ entry + cross
-    left = state.T @ P @ state + weight_state - mixed @ casadi.solve(entry.T @ P @ entry + weight_input, mixed.T) - P
-    return P - stage, casadi.norm_inf(casadi.vec(left)) / casadi.norm_inf(casadi.vec(P))
+    left = state.T @ P @ state + weight_state - mixed @ ca.solve(entry.T @ P @ entry + weight_input, mixed.T) - P
+    return P - stage, ca.norm_inf(ca.vec(left)) / ca.norm_inf(ca.vec(P))

@@ -1,16 +1,16 @@
-import casadi
+import casadi as ca
 
 from ._riccati import riccati
 
 
 def kalman_gain(
-    A: casadi.MX,
-    B: casadi.MX,
-    C: casadi.MX,
+    A: ca.MX,
+    B: ca.MX,
+    C: ca.MX,
     input_noise: float,
     disturbance_noise: float,
-    measurement_noise: casadi.DM,
-) -> tuple[casadi.MX, casadi.MX]:
+    measurement_noise: ca.DM,
+) -> tuple[ca.MX, ca.MX]:
     r"""Steady Kalman gains (n, p) of the state and (p, p) of the output disturbance.
 
     The model is extended by a disturbance d on the outputs that wanders as a random walk (Pannocchia and Rawlings,
@@ -31,10 +31,10 @@ def kalman_gain(
         (p,) standard deviation of e, m.
     """
     n, p = A.shape[0], C.shape[0]
-    extended = casadi.diagcat(A, casadi.MX.eye(p))
-    output = casadi.horzcat(C, casadi.MX.eye(p))
-    process = casadi.diagcat(input_noise**2 * B @ B.T, disturbance_noise**2 * casadi.MX.eye(p))
-    measured = casadi.MX(casadi.diag(measurement_noise**2))
+    extended = ca.diagcat(A, ca.MX.eye(p))
+    output = ca.horzcat(C, ca.MX.eye(p))
+    process = ca.diagcat(input_noise**2 * B @ B.T, disturbance_noise**2 * ca.MX.eye(p))
+    measured = ca.MX(ca.diag(measurement_noise**2))
     covariance = riccati(extended.T, output.T, process, measured)
-    gain = casadi.solve(output @ covariance @ output.T + measured, output @ covariance).T
+    gain = ca.solve(output @ covariance @ output.T + measured, output @ covariance).T
     return gain[:n, :], gain[n:, :]

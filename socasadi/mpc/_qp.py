@@ -4,7 +4,7 @@ import contextlib
 import os
 from collections.abc import Iterator
 
-import casadi
+import casadi as ca
 
 KKT_TOLERANCE = 1e-6
 """Largest KKT residual (see :func:`kkt_residual`) of an answer that is believed."""
@@ -35,25 +35,25 @@ def check_backend(name: str) -> None:
         raise ValueError(f"unknown QP back end {name!r}; there are {', '.join(BACKENDS)}")
 
 
-def qp_solver(name: str, variables: int, rows: int) -> casadi.Function:
+def qp_solver(name: str, variables: int, rows: int) -> ca.Function:
     """CasADi conic Function of a dense QP, min v'Hv/2 + g'v with bounds on v and on A v."""
     check_backend(name)
-    pattern = {"h": casadi.Sparsity.dense(variables, variables), "a": casadi.Sparsity.dense(rows, variables)}
+    pattern = {"h": ca.Sparsity.dense(variables, variables), "a": ca.Sparsity.dense(rows, variables)}
     with quiet(name == "qpoases"):
-        return casadi.conic("qp", name, pattern, {**_OPTIONS[name], "error_on_fail": False})
+        return ca.conic("qp", name, pattern, {**_OPTIONS[name], "error_on_fail": False})
 
 
 def kkt_residual(
-    H: casadi.MX,
-    g: casadi.MX,
-    A: casadi.MX,
-    upper_rows: casadi.MX,
-    lower: casadi.DM,
-    upper: casadi.DM,
-    v: casadi.MX,
-    multipliers: casadi.MX,
-    row_multipliers: casadi.MX,
-) -> casadi.MX:
+    H: ca.MX,
+    g: ca.MX,
+    A: ca.MX,
+    upper_rows: ca.MX,
+    lower: ca.DM,
+    upper: ca.DM,
+    v: ca.MX,
+    multipliers: ca.MX,
+    row_multipliers: ca.MX,
+) -> ca.MX:
     """Largest violation of the optimality conditions of min v'Hv/2 + g'v, lower <= v <= upper, A v <= upper_rows.
 
     Stationarity (relative to 1 + max |g|), feasibility, signs of the multipliers and complementarity; infinite when
@@ -62,33 +62,33 @@ def kkt_residual(
     """
     stationarity = H @ v + g + A.T @ row_multipliers + multipliers
     slack_rows = upper_rows - A @ v
-    at_upper, at_lower = casadi.fmax(multipliers, 0), casadi.fmax(-multipliers, 0)
+    at_upper, at_lower = ca.fmax(multipliers, 0), ca.fmax(-multipliers, 0)
     bounded = [i for i, value in enumerate(upper.full().ravel()) if value < float("inf")]
     open_above = [i for i in range(v.shape[0]) if i not in bounded]
     parts = [
-        casadi.fabs(stationarity) / (1 + casadi.norm_inf(g)),
+        ca.fabs(stationarity) / (1 + ca.norm_inf(g)),
         -slack_rows,
         -row_multipliers,
-        casadi.fabs(row_multipliers * slack_rows),
+        ca.fabs(row_multipliers * slack_rows),
         lower - v,
         at_lower * (v - lower),
         (v - upper)[bounded],
         (at_upper * (upper - v))[bounded],
         at_upper[open_above],
     ]
-    everything = casadi.vertcat(*parts)
+    everything = ca.vertcat(*parts)
     # mmax, by comparisons, would drop a NaN.
-    return casadi.if_else(finite(everything), casadi.mmax(everything), casadi.inf)
+    return ca.if_else(finite(everything), ca.mmax(everything), ca.inf)
 
 
-def finite(values: casadi.MX) -> casadi.MX:
+def finite(values: ca.MX) -> ca.MX:
     """1 when every entry is finite, else 0. (CasADi takes x - x for zero, so that it cannot serve as the test.)"""
-    return below(values, casadi.inf)
+    return below(values, ca.inf)
 
 
-def below(values: casadi.MX, limit: float) -> casadi.MX:
+def below(values: ca.MX, limit: float) -> ca.MX:
     """1 when every entry is a number of magnitude less than ``limit``, else 0."""
-    return casadi.mmin(casadi.fabs(values) < limit)
+    return ca.mmin(ca.fabs(values) < limit)
 
 
 @contextlib.contextmanager

@@ -1,9 +1,9 @@
-import casadi
+import casadi as ca
 
 _DOUBLINGS = 18
 
 
-def riccati(A: casadi.MX, B: casadi.MX, Q: casadi.MX, R: casadi.MX, S: casadi.MX | None = None) -> casadi.MX:
+def riccati(A: ca.MX, B: ca.MX, Q: ca.MX, R: ca.MX, S: ca.MX | None = None) -> ca.MX:
     r"""Solution P of the discrete algebraic Riccati equation, as an expression in its coefficients.
 
     .. math:: P = A'PA + Q - (A'PB + S)(B'PB + R)^{-1}(B'PA + S')
@@ -15,13 +15,13 @@ def riccati(A: casadi.MX, B: casadi.MX, Q: casadi.MX, R: casadi.MX, S: casadi.MX
     uses them is refused for its residual (:mod:`._design`).
     """
     if S is not None:
-        A, Q = A - B @ casadi.solve(R, S.T), Q - S @ casadi.solve(R, S.T)
-    identity = casadi.DM.eye(A.shape[0])
-    G, H = B @ casadi.solve(R, B.T), Q
+        A, Q = A - B @ ca.solve(R, S.T), Q - S @ ca.solve(R, S.T)
+    identity = ca.DM.eye(A.shape[0])
+    G, H = B @ ca.solve(R, B.T), Q
     for _ in range(_DOUBLINGS):
         # Both products with (I + G H)^-1 from one factorisation.
-        solved = casadi.solve(identity + G @ H, casadi.horzcat(A, G))
-        WA, WG = casadi.horzsplit(solved, [0, A.shape[0], 2 * A.shape[0]])
+        solved = ca.solve(identity + G @ H, ca.horzcat(A, G))
+        WA, WG = ca.horzsplit(solved, [0, A.shape[0], 2 * A.shape[0]])
         A, G, H = A @ WA, G + A @ WG @ A.T, H + A.T @ H @ WA
         G, H = (G + G.T) / 2, (H + H.T) / 2
     return H

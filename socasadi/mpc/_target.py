@@ -1,9 +1,9 @@
-import casadi
+import casadi as ca
 
 _CENTRING = 1e-8
 
 
-def steady_target(gain: casadi.MX, Q: casadi.MX, R: casadi.MX, centre: casadi.DM) -> tuple[casadi.MX, casadi.MX]:
+def steady_target(gain: ca.MX, Q: ca.MX, R: ca.MX, centre: ca.DM) -> tuple[ca.MX, ca.MX]:
     r"""The input at which the stage cost is least at rest, as ``v = v_0 + T (r - d)``: v_0 (m,) and T (m, p).
 
     .. math:: v = \arg\min_v |G v + d - r|^2_Q + |v|^2_R + \epsilon |v - v_c|^2
@@ -15,6 +15,6 @@ def steady_target(gain: casadi.MX, Q: casadi.MX, R: casadi.MX, centre: casadi.DM
     weighted = gain.T @ Q
     hessian = weighted @ gain + R
     # Relative to the best seen direction, so that a direction that the inputs hardly move is left alone.
-    small = _CENTRING * casadi.trace(hessian) / gain.shape[1]
-    solved = casadi.solve(hessian + small * casadi.MX.eye(gain.shape[1]), casadi.horzcat(weighted, small * centre))
+    small = _CENTRING * ca.trace(hessian) / gain.shape[1]
+    solved = ca.solve(hessian + small * ca.MX.eye(gain.shape[1]), ca.horzcat(weighted, small * centre))
     return solved[:, -1], solved[:, :-1]

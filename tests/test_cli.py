@@ -1,0 +1,164 @@
+"""The command, as a user runs it."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from socasadi.campaign import Journal
+from socasadi.codegen import c_compiler
+
+ROOT = Path(__file__).parent.parent
+STUDY = """
+from socasadi import *
+plant = SimulatedPlant(Rod.preset("{rod}"))
+mpc = LinearMPC(Modal.from_spec(length=0.6, bending_stiffness=0.64, mass_per_length=2.8, cable_offset=0.02), {mpc})
+study = Study(plant=plant, mpc=mpc, task={task}, seed_points={seed_points}, iterations={iterations}, verifications=1)
+"""
+
+
+def study(folder, *, rod="paper", mpc="", task="Circle(duration=1.0)", seed_points=4, iterations=2, name="study.py"):
+    script = folder / name
+    script.write_text(STUDY.format(rod=rod, mpc=mpc, task=task, seed_points=seed_points, iterations=iterations))
+    return script
+
+
+def socasadi(*arguments, cwd, **environment):
+    command = [sys.executable, "-m", "socasadi.cli", *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env={**os.environ, **environment})
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cli")
+    return folder, socasadi("run", study(folder), cwd=folder)
+
+
+def test_run_ends_with_the_theta_the_figures_and_a_checked_controller(finished):
+    folder, run = finished
+    assert run.returncode == 0, run.stderr
+    assert "trial 6/6" in run.stdout
+    assert "best of 6 Sobol points" in run.stdout
+    assert re.search(r"frequency_y +[\d.]+ +rad/s", run.stdout)
+    assert {"best", "Sobol", "identified"} <= set(run.stdout.split())
+    figures = folder / "runs" / "study" / "figures"
+    names = {"convergence", "responses", "path", "inputs", "shapes"}
+    assert {file.name for file in figures.iterdir()} == {f"{name}.{kind}" for name in names for kind in ("png", "pdf")}
+    if c_compiler():
+        assert "20 samples, 0 clipped, 0 held" in run.stdout
+
+
+def test_show_plot_and_export_need_the_run_folder_alone(finished, tmp_path):
+    folder, _ = finished
+    run = shutil.copytree(folder / "runs" / "study", tmp_path / "moved")
+    shown = socasadi("show", run, cwd=tmp_path)
+    assert shown.returncode == 0
+    assert "best" in shown.stdout
+    assert "complete" in shown.stdout
+    assert socasadi("plot", run, "--trial", 2, cwd=tmp_path).returncode == 0
+    exported = socasadi("export", run, "--out", "c", cwd=tmp_path)
+    assert exported.returncode == 0, exported.stderr
+    assert (tmp_path / "c" / "controller.h").exists()
+
+
+def test_a_robot_that_only_pulls_and_one_that_hangs_work_through_the_whole_line(tmp_path):
+    script = study(tmp_path, rod="hanging", mpc="input_bounds=(0, 10)", task="Circle(radius=0.015, duration=1.0)")
+    run = socasadi("run", script, cwd=tmp_path)
+    assert run.returncode == 0, run.stderr
+    with Journal(tmp_path / "runs" / "study" / "journal.sqlite") as journal:
+        for trial in journal.trials():
+            tension = journal.episode(trial.number).tension
+            assert tension.min() >= 0
+            assert tension.max() <= 10
+
+
+def test_without_a_compiler_it_says_so_once_and_gives_the_same_numbers(finished, tmp_path):
+    folder, _ = finished
+    nothing = tmp_path / "bin"
+    nothing.mkdir()
+    run = socasadi("run", study(tmp_path), cwd=tmp_path, PATH=str(nothing), CC="")
+    assert run.returncode == 0, run.stderr
+    assert run.stderr.count("no C compiler found") == 1
+    assert "was not built: no C compiler found" in run.stdout
+    with (
+        Journal(folder / "runs" / "study" / "journal.sqlite") as compiled,
+        Journal(tmp_path / "runs" / "study" / "journal.sqlite") as interpreted,
+    ):
+        costs = [[trial.J for trial in journal.trials()] for journal in (compiled, interpreted)]
+    np.testing.assert_allclose(*costs, rtol=1e-6)
+
+
+def test_ctrl_c_says_how_to_go_on_and_going_on_finishes(tmp_path):
+    script = study(tmp_path, seed_points=30, iterations=0)
+    command = [sys.executable, "-u", "-m", "socasadi.cli", "run", str(script)]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    while not process.stdout.readline().startswith("trial  3/30"):
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "go on with: socasadi run" in said
+    assert "--resume" in said
+    assert "Traceback" not in said
+    again = socasadi("run", script, "--resume", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    with Journal(tmp_path / "runs" / "study" / "journal.sqlite") as journal:
+        assert [trial.number for trial in journal.trials()] == list(range(1, 31))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("run", "nowhere.py"), "there is no study script nowhere.py"),
+        (("run", "empty.py"), "empty.py defines no `study`"),
+        (("run", "unknown.py"), "no preset is called 'papre'; there are paper, hanging, paper_literal"),
+        (("run", "crossing.py"), "input_bounds cross: lower 10 is not below upper -10"),
+        (("run", "backend.py"), "unknown QP back end 'gurobi'; there are daqp, qpoases, osqp"),
+        (("show", "nowhere"), "there is no run folder nowhere"),
+        (("plot", "."), ". is no run folder: it has no study.json"),
+        (("export", "nowhere", "--out", "c"), "there is no run folder nowhere"),
+    ],
+)
+def test_a_mistake_is_answered_by_one_sentence(tmp_path, arguments, words):
+    (tmp_path / "empty.py").write_text("")
+    study(tmp_path, rod="papre", name="unknown.py")
+    study(tmp_path, mpc="input_bounds=(10, -10)", name="crossing.py")
+    study(tmp_path, mpc="backend='gurobi'", name="backend.py")
+    run = socasadi(*arguments, cwd=tmp_path)
+    assert run.returncode == 1
+    assert words in run.stderr
+    assert run.stderr.startswith("socasadi: ")
+    assert len(run.stderr.strip().splitlines()) == 1
+
+
+def test_what_cannot_be_exported_yet_is_said(finished, tmp_path):
+    folder, _ = finished
+    for option, words in ((("--real", "float"), "real='float'"), (("--solver", "active-set"), "solver='active-set'")):
+        run = socasadi("export", folder / "runs" / "study", "--out", tmp_path / "c", *option, cwd=tmp_path)
+        assert run.returncode == 1
+        assert f"{words} cannot be exported yet" in run.stderr
+
+
+def test_a_run_folder_that_exists_needs_resume_and_the_same_settings(finished):
+    folder, _ = finished
+    again = socasadi("run", "study.py", cwd=folder)
+    assert again.returncode == 1
+    assert "exists already; resume it (--resume)" in again.stderr
+    other = socasadi("run", "study.py", "--resume", "--seed", 5, cwd=folder)
+    assert other.returncode == 1
+    assert "other settings: seed was 0 and is 5" in other.stderr
+
+
+def test_the_readmes_ten_lines_run(tmp_path):
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+    short = code.replace("iterations=20", "iterations=1, seed_points=2")
+    assert short != code
+    run = subprocess.run([sys.executable, "-c", short], cwd=tmp_path, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert (tmp_path / "build" / "controller.h").exists()
