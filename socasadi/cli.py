@@ -37,7 +37,8 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-out = Console(highlight=False, soft_wrap=True)
+# A file or a pipe has no width; a table must not be folded for it.
+out = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 120)
 
 StudyFile = Annotated[Path, typer.Argument(help="Python file that defines `study`.")]
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")]
@@ -56,29 +57,13 @@ def run(
     changes = {"iterations": iterations, "seed": seed}
     study = replace(study, **{name: value for name, value in changes.items() if value is not None})
     folder = folder or Path("runs") / script.stem
+    out.print(f"{script}: {study.trials} trials of {study.task.duration:g} s, into {folder}")
     start = time.monotonic()
     try:
-        out.print(f"{script}: {study.trials} trials of {study.task.duration:g} s, into {folder}")
-        with _progress("search") as progress:
-            result = study.run(folder, resume=resume, progress=progress)
-        with _progress("Sobol points, the baseline") as progress:
-            baseline = study.sobol_only().run(folder / "sobol", resume=resume, progress=progress)
+        _run(study, folder, resume)
     except KeyboardInterrupt:
-        out.print(
-            f"\nStopped. Every finished trial is stored; go on with: socasadi run {script} --out {folder} --resume"
-        )
+        out.print(f"\nStopped. Every finished trial is stored; go on with: {_again(script, folder, iterations, seed)}")
         raise typer.Exit(130) from None
-    rivals = {} if not any(trial.J is not None for trial in baseline.trials) else {"Sobol": baseline.best.theta}
-    with out.status("assessing") as status:
-        verdicts = assess(result, rivals, notify=lambda what: status.update(what))
-        status.update("drawing")
-        files = save_figures(figures(result, baseline.trials), folder / "figures")
-        status.update("exporting and building the controller")
-        result.export(folder / "controller")
-        replayed = _replay(folder / "controller")
-    _summary(result, baseline, verdicts)
-    out.print(f"\ncontroller  {folder / 'controller'}\n            {replayed}")
-    out.print(f"figures     {folder / 'figures'}: {', '.join(sorted({file.stem for file in files}))}")
     out.print(f"\n{clock(time.monotonic() - start)} in all")
 
 
@@ -136,6 +121,31 @@ def main() -> None:
     except (RunError, JournalError, ExportError, ValueError, TypeError, OSError) as error:
         print(f"socasadi: {error}", file=sys.stderr)
         sys.exit(1)
+
+
+def _run(study: Study, folder: Path, resume: bool) -> None:
+    with _progress("search") as progress:
+        result = study.run(folder, resume=resume, progress=progress)
+    with _progress("Sobol points, the baseline") as progress:
+        baseline = study.sobol_only().run(folder / "sobol", resume=resume, progress=progress)
+    rivals = {"Sobol": baseline.best.theta} if any(trial.J is not None for trial in baseline.trials) else {}
+    with out.status("assessing") as status:
+        verdicts = assess(result, rivals, notify=status.update)
+        status.update("drawing")
+        files = save_figures(figures(result, baseline.trials), folder / "figures")
+        status.update("exporting and building the controller")
+        result.export(folder / "controller")
+        replayed = _replay(folder / "controller")
+    _summary(result, baseline, verdicts)
+    out.print(f"\ncontroller  {folder / 'controller'}\n            {replayed}")
+    out.print(f"figures     {folder / 'figures'}: {', '.join(sorted({file.stem for file in files}))}")
+
+
+def _again(script: Path, folder: Path, iterations: int | None, seed: int | None) -> str:
+    """The command that goes on with a stopped run."""
+    options = {"--iterations": iterations, "--seed": seed, "--out": folder}
+    given = [f"{name} {value}" for name, value in options.items() if value is not None]
+    return " ".join(["socasadi run", str(script), *given, "--resume"])
 
 
 def _load(script: Path) -> Study:

@@ -2,8 +2,8 @@
 
     socasadi run studies/origin.py
 
-The tip starts at rest at (-10, 40) mm. With `pulse=Pulse(time=10, duration=0.2, force=(0, 2, 0))` in the task, a force
-disturbs it on the way ("under perturbation" in the paper's figure).
+The tip starts at rest at (-10, 40) mm. With `pulse=Pulse(time=10, duration=0.2, force=(0, 0.5, 0))` in the task, a
+force disturbs it on the way ("under perturbation" in the paper's figure).
 """
 
 from socasadi import Cost, LinearMPC, Modal, Origin, Rod, SimulatedPlant, Study

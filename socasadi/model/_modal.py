@@ -80,7 +80,7 @@ class Modal(PredictionModel):
             centres = [gain * direction(math.radians(angle)) for angle in cable_angles]
             width = gain * (1 - 1 / margin)
             bounds += [(frequency / margin, frequency * margin), damping_ratio]
-            bounds += [(centre - width, centre + width) for centre in centres]
+            bounds += [(round(centre - width, 9), round(centre + width, 9)) for centre in centres]
         return cls(axes=2, inputs=len(centres), bounds=tuple(bounds))
 
     def _default_entries(self) -> tuple[Entry, ...]:

@@ -218,7 +218,7 @@ class Optimizer:
         if self._fitted is None or self._fitted[0] != count:
             points = np.array([self.space.to_unit(trial.theta) for trial in self.trials])
             aim = targets(self.trials, self._transform)
-            # Matrices this small lose on threads, by a factor of seven on two busy cores, and last bits with them.
+            # Matrices this small only lose time on threads, and last bits with their number.
             with threadpool_limits(1):
                 posterior = fit(points, aim.values, self._fit_settings, self._generator(0))
             self._fitted = (count, posterior, aim)
