@@ -3,7 +3,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from ..campaign import Trial
-from ._style import BLACK, BLUE, COLUMN, GREY, MM, ORANGE, legend_above, page
+from ._style import BLACK, BLUE, COLUMN, MM, ORANGE, legend_above, page
 
 
 def convergence(trials: list[Trial], baseline: list[Trial] | None = None) -> Figure:
@@ -13,17 +13,20 @@ def convergence(trials: list[Trial], baseline: list[Trial] | None = None) -> Fig
     for phase, label, marker, face in (("seed", "seed point", "s", "white"), ("search", "search", "o", BLUE)):
         done = [(t.number, t.J) for t in trials if t.phase == phase and t.J is not None]
         if done:
-            axes.plot(*np.transpose(done), marker, mfc=face, mec=BLUE, mew=0.7, label=label, zorder=3, clip_on=False)
+            style = {"mfc": face, "mec": BLUE, "mew": 0.6, "ms": 2.8, "zorder": 2}
+            axes.plot(*np.transpose(done), marker, label=label, **style)
     failed = [t.number for t in trials if t.J is None]
     if failed:
         # Failures have no cost: they stand on the upper edge.
         edge = axes.get_xaxis_transform()
         axes.plot(failed, np.ones(len(failed)), "x", color=ORANGE, label="failed", transform=edge, clip_on=False)
     incumbent = best_so_far(trials)
-    axes.step(np.arange(1, len(trials) + 1), incumbent, where="post", color=BLACK, lw=1.2, label="best so far")
+    axes.step(np.arange(1, len(trials) + 1), incumbent, where="post", color=BLACK, label="best so far", zorder=4)
     if baseline:
         steps = np.arange(1, len(baseline) + 1)
-        axes.step(steps, best_so_far(baseline), where="post", color=GREY, ls="--", lw=1.2, label="best of Sobol points")
+        axes.step(
+            steps, best_so_far(baseline), where="post", color=ORANGE, ls="--", label="best of Sobol points", zorder=3
+        )
     if np.isfinite(incumbent).any():
         best = int(np.nanargmin(incumbent))
         axes.plot(best + 1, incumbent[best], "*", color=ORANGE, ms=9, mec="white", mew=0.5, zorder=5)
@@ -40,9 +43,9 @@ def convergence(trials: list[Trial], baseline: list[Trial] | None = None) -> Fig
     axes.yaxis.set_major_locator(LogLocator(numticks=8))
     axes.yaxis.set_minor_formatter(NullFormatter())
     low, high = axes.get_ylim()
-    axes.set_ylim(low / 1.5, high)
+    axes.set_ylim(low / 2, high)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlim(0, max(len(trials), len(baseline or [])) + 1)
+    axes.set_xlim(0, max(len(trials), len(baseline or [])) + 2)
     axes.set_xlabel("trial")
     axes.set_ylabel("cost J")
     legend_above(axes, 2)

@@ -77,7 +77,7 @@ def inputs(episode: Episode, limits: Limits) -> Figure:
 
 
 def shapes(episode: Episode, instants: int = 6) -> Figure | None:
-    """The rod at several instants, in three dimensions, hanging from its base as a bench would have it.
+    """The rod in three dimensions at those instants at which its tips lie farthest from each other.
 
     None when the episode holds no shapes.
     """
@@ -86,14 +86,14 @@ def shapes(episode: Episode, instants: int = 6) -> Figure | None:
     # Constrained layout does not know how far the labels of three dimensions reach.
     figure = Figure(figsize=(COLUMN, 92 * MM), layout="none")  # pyright: ignore[reportArgumentType]
     axes = figure.add_subplot(projection="3d")
-    chosen = np.unique(np.linspace(0, len(episode.shapes) - 1, instants).round().astype(int))
+    chosen = _far_apart(episode.shapes[:, -1], instants)
     every = (len(episode.output) - 1) / max(len(episode.shapes) - 1, 1)
     for k, index in enumerate(chosen):
         x, y, z = 1e3 * episode.shapes[index].T
         shade = 0.75 * (1 - k / max(len(chosen) - 1, 1))
         colour = (shade, 0.447 * (1 - shade) + shade * 0.85, 0.698 * (1 - shade) + shade * 0.95)
         time = index * round(every) * episode.sample_time
-        axes.plot(y, z, x, color=colour, lw=1.6, label=f"{time:.0f} s")
+        axes.plot(y, z, x, color=colour, lw=1.6, label=f"{time:.4g} s")
         axes.plot(y[-1:], z[-1:], x[-1:], "o", color=colour, ms=3)
     length = 1e3 * np.abs(episode.shapes).max()
     if episode.reference.shape[1] == 2 and np.ptp(episode.reference, axis=0).max() > 0:
@@ -110,6 +110,15 @@ def shapes(episode: Episode, instants: int = 6) -> Figure | None:
     figure.subplots_adjust(left=0.08, right=0.92, bottom=0.04, top=1.0)
     figure.legend(loc="upper left", ncols=1)
     return figure
+
+
+def _far_apart(points: np.ndarray, count: int) -> list[int]:
+    """Up to ``count`` rows that lie far from each other, the first and the last among them, in their order."""
+    chosen = [0, len(points) - 1]
+    while len(chosen) < min(count, len(points)):
+        distance = np.linalg.norm(points[:, None] - points[chosen], axis=2).min(axis=1)
+        chosen.append(int(np.argmax(distance)))
+    return sorted(set(chosen))
 
 
 def _output_name(index: int, count: int) -> str:

@@ -8,7 +8,7 @@ from ._checks import finite
 
 @dataclass(frozen=True)
 class Cable:
-    """A cable parallel to the rod's axis, fixed at the tip, that pulls with a tension at or above zero newtons.
+    """A cable parallel to the rod's axis, fixed at the tip; a positive tension pulls, a negative one pushes.
 
     Parameters
     ----------
