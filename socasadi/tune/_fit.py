@@ -43,8 +43,8 @@ class FitSettings:
     mean: str = "constant"
     priors: bool = True
     noise: float | None = None
-    screened: int = 20
-    restarts: int = 2
+    screened: int = 60
+    restarts: int = 4
     iterations: int = 100
 
     def __post_init__(self) -> None:
