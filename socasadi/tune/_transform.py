@@ -60,6 +60,8 @@ class LogHalfRank:
         median = np.median(logs)
         bad = logs > median
         scale = np.sqrt(np.mean((logs[~bad] - median) ** 2))
+        if scale == 0:
+            return logs
         quantiles = norm.ppf((rankdata(logs) - 0.5) / len(logs))
         return np.where(bad, np.minimum(logs, median + scale * quantiles), logs)
 

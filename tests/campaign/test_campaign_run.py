@@ -245,3 +245,20 @@ class TestAssessment:
     def test_the_identified_theta_predicts_no_worse_than_the_tuned_one(self, toy_study, tmp_path):
         verdicts = assess(toy_study.run(tmp_path / "run", progress=None))
         assert verdicts["identified"].prediction_error <= 1.05 * verdicts["best"].prediction_error
+
+
+@pytest.mark.parametrize("search", ["paper", "sobol"])
+def test_every_search_by_name_makes_a_whole_run(toy_study, tmp_path, search):
+    study = replace(toy_study, search=search, iterations=3)
+    assert len(study.run(tmp_path / "run", progress=None).trials) == 9
+
+
+def test_a_pulse_on_the_tip_is_felt(toy_study, tmp_path):
+    from socasadi import Origin, Pulse
+
+    def farthest(pulse):
+        study = replace(toy_study, task=Origin(duration=1.0, pulse=pulse), seed_points=1, iterations=0)
+        episode = study.run(tmp_path / str(pulse is None), progress=None).episode(1)
+        return np.abs(episode.truth[11:14, 0]).max()
+
+    assert farthest(Pulse(time=0.5, duration=0.1, force=(0, 50, 0))) > farthest(None) + 0.01
