@@ -17,13 +17,13 @@ from rich.progress import Progress as Bar
 from rich.table import Table
 
 from .campaign import (
+    Assessment,
     JournalError,
     Progress,
     Result,
     RunError,
     Study,
     Trial,
-    Verdict,
     assess,
     clock,
     progress_line,
@@ -130,13 +130,13 @@ def _run(study: Study, folder: Path, resume: bool) -> None:
         baseline = study.sobol_only().run(folder / "sobol", resume=resume, progress=progress)
     rivals = {"Sobol": baseline.best.theta} if any(trial.J is not None for trial in baseline.trials) else {}
     with out.status("assessing") as status:
-        verdicts = assess(result, rivals, notify=status.update)
+        assessment = assess(result, rivals, notify=status.update)
         status.update("drawing")
         files = save_figures(figures(result, baseline.trials), folder / "figures")
         status.update("exporting and building the controller")
         result.export(folder / "controller")
         replayed = _replay(folder / "controller")
-    _summary(result, baseline, verdicts)
+    _summary(result, baseline, assessment)
     out.print(f"\ncontroller  {folder / 'controller'}\n            {replayed}")
     out.print(f"figures     {folder / 'figures'}: {', '.join(sorted({file.stem for file in files}))}")
 
@@ -183,23 +183,25 @@ def _progress(title: str):
         yield report
 
 
-def _summary(result: Result, baseline: Result, verdicts: dict[str, Verdict]) -> None:
+def _summary(result: Result, baseline: Result, assessment: Assessment) -> None:
     failed = sum(trial.J is None for trial in result.trials)
     out.print(f"\nbest of {len(result.trials)} trials ({failed} failed): {_found(result)}")
     if any(trial.J is not None for trial in baseline.trials):
         out.print(f"best of {len(baseline.trials)} Sobol points: {_found(baseline)}")
-    if verdicts:
+    if assessment.verdicts:
         table = Table(box=None, header_style="bold", title_justify="left", title_style="")
         table.title = f"\neach theta flown {result.study.verifications} times under fresh noise:"
         for heading in ("theta", "J (median)", "RMSE / mm (median, worst)", "failed", "open-loop error / mm"):
             table.add_column(heading, justify="left" if heading == "theta" else "right")
-        for name, verdict in verdicts.items():
+        for name, verdict in assessment.verdicts.items():
             flown = ("-", "-")
             if len(verdict.J):
                 rmse = 1e3 * verdict.rmse
                 flown = (f"{np.median(verdict.J):.4g}", f"{np.median(rmse):.3f}, {rmse.max():.3f}")
             table.add_row(name, *flown, str(verdict.failed), f"{1e3 * verdict.prediction_error:.2f}")
         out.print(table)
+        if assessment.unidentified:
+            out.print(f"no model was identified: {assessment.unidentified}")
     _theta(result, result.best)
 
 

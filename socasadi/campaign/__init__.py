@@ -1,6 +1,6 @@
 """Experiments and the search over them: tasks, cost, episodes, the journal, and the study that ties them together."""
 
-from ._assess import Verdict, assess
+from ._assess import Assessment, Verdict, assess
 from ._cost import Cost, Score
 from ._episode import Episode, fly
 from ._journal import Flight, Journal, JournalError, Trial
@@ -11,6 +11,7 @@ from ._study import Study
 from ._task import Circle, Origin, Pulse, Task
 
 __all__ = [
+    "Assessment",
     "Circle",
     "Cost",
     "Episode",

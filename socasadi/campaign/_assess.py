@@ -31,7 +31,7 @@ class Verdict:
     failed
         Number of flights that did.
     prediction_error
-        Open-loop root mean square distance on a probing record that it was not fitted to, m.
+        Open-loop root mean square distance on a probing record that it was not fitted to, m; NaN without one.
     """
 
     theta: np.ndarray
@@ -41,9 +41,25 @@ class Verdict:
     prediction_error: float
 
 
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """Thetas beside each other.
+
+    Attributes
+    ----------
+    verdicts
+        By name: ``"best"``, the rivals, ``"identified"``.
+    unidentified
+        Why there is no identified theta; None when there is one.
+    """
+
+    verdicts: dict[str, Verdict]
+    unidentified: str | None = None
+
+
 def assess(
     result: Result, rivals: Mapping[str, np.ndarray] | None = None, notify: Callable[[str], None] = lambda _: None
-) -> dict[str, Verdict]:
+) -> Assessment:
     """Fly the best theta, ``rivals`` and an identified theta under the same fresh noise, and compare them as models.
 
     Experiments: two probing records (one to identify from, one to judge all on) and ``study.verifications`` flights of
@@ -58,17 +74,21 @@ def assess(
 
     Returns
     -------
-    dict
-        Verdicts by name: ``"best"``, the rivals, ``"identified"``. Empty when the study asks for no verifications.
+    Assessment
+        Without verdicts when the study asks for no verifications.
     """
     study = result.study
     if study.verifications == 0:
-        return {}
+        return Assessment({}, "the study asks for no verifications")
+    thetas, judged, unidentified = {"best": result.best.theta, **(rivals or {})}, None, None
     with Journal(journal_path(result.folder), writer=True) as journal:
-        notify("probing the plant")
-        fitted, judged = (_probing(result, journal, index) for index in (1, 2))
-        notify("identifying a model")
-        thetas = {"best": result.best.theta, **(rivals or {}), "identified": identify(study.mpc.model, fitted.record)}
+        try:
+            notify("probing the plant")
+            fitted, judged = (_probing(result, journal, index) for index in (1, 2))
+            notify("identifying a model")
+            thetas["identified"] = identify(study.mpc.model, fitted.record)
+        except Exception as error:  # as in a trial: whatever the plant raises, the run goes on
+            unidentified = f"{type(error).__name__}: {error}"
         verdicts = {}
         for name, theta in thetas.items():
             notify(f"flying {name} {study.verifications} times")
@@ -79,9 +99,9 @@ def assess(
                 J=np.array([score.J for score in scores]),
                 rmse=np.array([score.rmse for score in scores]),
                 failed=study.verifications - len(scores),
-                prediction_error=prediction_error(study.mpc.model, theta, judged.record),
+                prediction_error=prediction_error(study.mpc.model, theta, judged.record) if judged else np.nan,
             )
-    return verdicts
+    return Assessment(verdicts, unidentified)
 
 
 def _probing(result: Result, journal: Journal, index: int) -> Episode:

@@ -240,10 +240,28 @@ class TestAssessment:
         toy_study.plant.step = lambda *a, **k: (steps.append(1), original(toy_study.plant, *a, **k))[1]
         second = assess(Result(counted, result.folder))
         assert not steps
-        np.testing.assert_array_equal(first["best"].J, second["best"].J)
+        np.testing.assert_array_equal(first.verdicts["best"].J, second.verdicts["best"].J)
+
+    def test_a_plant_that_cannot_be_probed_still_has_its_best_theta_verified(self, toy_study, tmp_path):
+        class Tired(type(toy_study.plant)):
+            def reset(self, tip=None, *, seed=None, tension_bounds=(-inf, inf)):
+                self.steps = 0
+                return super().reset(tip, seed=seed)
+
+            def step(self, tension, tip_force=None):
+                self.steps += 1
+                if self.steps > 50:
+                    raise PlantFailure("the battery is empty")
+                return super().step(tension, tip_force)
+
+        result = replace(toy_study, plant=Tired()).run(tmp_path / "run", progress=None)
+        assessment = assess(result)
+        assert set(assessment.verdicts) == {"best"}
+        assert np.isnan(assessment.verdicts["best"].prediction_error)
+        assert assessment.unidentified == "PlantFailure: the battery is empty"
 
     def test_the_identified_theta_predicts_no_worse_than_the_tuned_one(self, toy_study, tmp_path):
-        verdicts = assess(toy_study.run(tmp_path / "run", progress=None))
+        verdicts = assess(toy_study.run(tmp_path / "run", progress=None)).verdicts
         assert verdicts["identified"].prediction_error <= 1.05 * verdicts["best"].prediction_error
 
 
