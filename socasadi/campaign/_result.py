@@ -132,7 +132,10 @@ class Result:
             provenance=(
                 f"trial {best.number} of {len(self.trials)}, J = {best.J!r}",
                 f"prediction model {type(mpc.model).__name__}, theta:",
-                *[f"    {entry.name} = {float(value)!r} {entry.unit}" for entry, value in entries],
+                *[
+                    f"    {entry.name} = {float(value)!r} {entry.unit.removesuffix('1')}".rstrip()
+                    for entry, value in entries
+                ],
                 f"{mpc.input_term} input term, Q = {mpc.Q}, R = {mpc.R}, terminal cost {mpc.terminal}",
                 f"seed {self.study.seed}, search {self.study.search}, task {type(self.study.task).__name__}",
                 f"sha256 of the journal {digest}",

@@ -1,6 +1,7 @@
 import dataclasses
 import importlib.metadata
 import platform
+import re
 import shlex
 import shutil
 import subprocess
@@ -57,13 +58,12 @@ def export(record: ControllerRecord, folder: str | Path, *, real: str = "double"
     design = mpc.design(record.system)
 
     laws = ca.CodeGenerator("law.c", {"with_header": True})
-    qp_law, plain_law = control_law(mpc, design), control_law(mpc, design, with_qp=False)
-    laws.add(qp_law)
-    laws.add(plain_law)
+    laws.add(control_law(mpc, design))
+    laws.add(control_law(mpc, design, with_qp=False))
     laws.generate(f"{folder}/")
     for source in files("socasadi.export").joinpath("c").iterdir():
         (folder / source.name).write_text(source.read_text())
-    version = _copy_osqp(folder / "osqp")
+    _copy_osqp(folder / "osqp")
 
     facts = {
         "title": "Model predictive controller tuned by socasadi",
@@ -82,9 +82,8 @@ def export(record: ControllerRecord, folder: str | Path, *, real: str = "double"
         "output": record.output,
         "preview": record.preview.reshape(len(record.output), -1),
         "tension": expected_tensions(record),
-        "osqp_version": version,
         "machine": f"{platform.system()} on {platform.machine()}",
-        "stack": f"{8 * (qp_law.sz_w() + plain_law.sz_w()) / 1024:.0f}",
+        "stack": f"{8 * _working_numbers(folder / 'law.h') / 1024:.0f}",
     }
     for name in ("controller_data.h", "episode.h", "README.md"):
         (folder / name).write_text(_template(name).render(facts))
@@ -124,17 +123,19 @@ def build_and_replay(folder: str | Path) -> str:
     return run.stdout.strip()
 
 
-def _copy_osqp(folder: Path) -> str:
-    """Headers and static library of OSQP, as the casadi package holds them; returns OSQP's version."""
+def _working_numbers(header: Path) -> int:
+    """How many doubles the larger of the two laws needs to work with, from the header that CasADi generated."""
+    return max(int(count) for count in re.findall(r"#define \w+_SZ_W (\d+)", header.read_text()))
+
+
+def _copy_osqp(folder: Path) -> None:
+    """Headers and static library of OSQP, as the casadi package holds them."""
     package = Path(ca.__file__).parent
     library, headers = package / "libosqpstatic.a", package / "include" / "osqp"
     if not library.exists() or not headers.is_dir():
         raise ExportError(f"this build of casadi has no static OSQP library in {package}; install casadi from PyPI")
     shutil.copy(library, folder)
     shutil.copytree(headers, folder / "include" / "osqp", dirs_exist_ok=True)
-    text = (headers / "osqp_api_constants.h").read_text()
-    marked = [line.split('"')[1] for line in text.splitlines() if "OSQP_VERSION" in line and line.count('"') == 2]
-    return marked[0] if marked else ""
 
 
 def _versions() -> list[str]:

@@ -80,7 +80,8 @@ class Modal(PredictionModel):
             centres = [gain * direction(math.radians(angle)) for angle in cable_angles]
             width = gain * (1 - 1 / margin)
             bounds += [(frequency / margin, frequency * margin), damping_ratio]
-            bounds += [(round(centre - width, 9), round(centre + width, 9)) for centre in centres]
+            # Rounded, so that a bound that is zero is not 1e-18, and plus zero, so that it is not -0.
+            bounds += [(round(centre - width, 12) + 0.0, round(centre + width, 12) + 0.0) for centre in centres]
         return cls(axes=2, inputs=len(centres), bounds=tuple(bounds))
 
     def _default_entries(self) -> tuple[Entry, ...]:

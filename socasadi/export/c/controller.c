@@ -5,6 +5,8 @@
 
 #include "law.h"
 
+#define LARGER(a, b) ((a) > (b) ? (a) : (b))
+
 enum { LAST_INPUT = CONTROLLER_STATES - CONTROLLER_INPUTS };
 
 static int all_finite(const double *values, int count) {
@@ -41,9 +43,9 @@ void controller_reset(controller *self, const double u_before[CONTROLLER_INPUTS]
 
 int controller_step(controller *self, const double y[CONTROLLER_OUTPUTS],
                     const double r[CONTROLLER_HORIZON * CONTROLLER_OUTPUTS], double u[CONTROLLER_INPUTS]) {
-    double work[law_SZ_W + law_without_qp_SZ_W];
-    const double *arguments[law_SZ_ARG + law_without_qp_SZ_ARG];
-    double *results[law_SZ_RES + law_without_qp_SZ_RES];
+    double work[LARGER(law_SZ_W, law_without_qp_SZ_W)];
+    const double *arguments[LARGER(law_SZ_ARG, law_without_qp_SZ_ARG)];
+    double *results[LARGER(law_SZ_RES, law_without_qp_SZ_RES)];
     double next[CONTROLLER_STATES], status = CONTROLLER_HELD, residual = INFINITY;
 
     arguments[0] = y;
