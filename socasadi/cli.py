@@ -151,7 +151,7 @@ def _again(script: Path, folder: Path, iterations: int | None, seed: int | None)
 def _load(script: Path) -> Study:
     if not script.is_file():
         raise RunError(f"there is no study script {script}")
-    study = runpy.run_path(str(script), run_name="study").get("study")
+    study = runpy.run_path(str(script), run_name="__study__").get("study")
     if not isinstance(study, Study):
         raise RunError(f"{script} defines no `study`: let it make one, study = Study(plant=..., mpc=..., task=...)")
     return study

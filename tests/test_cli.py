@@ -162,3 +162,15 @@ def test_the_readmes_ten_lines_run(tmp_path):
     run = subprocess.run([sys.executable, "-c", short], cwd=tmp_path, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     assert (tmp_path / "build" / "controller.h").exists()
+
+
+def test_a_run_begun_by_python_goes_on_by_the_command_with_a_robot_of_ones_own(tmp_path):
+    script = study(tmp_path, seed_points=3, iterations=0)
+    own = "class Arm(SimulatedPlant): pass\nplant = Arm("
+    text = script.read_text().replace("plant = SimulatedPlant(", own)
+    script.write_text(text + "if __name__ == '__main__': study.run('runs/study')\n")
+    assert subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True).returncode == 0
+    again = socasadi("run", script, "--resume", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    for command in (["show", "runs/study"], ["plot", "runs/study"], ["export", "runs/study", "--out", "c"]):
+        assert socasadi(*command, cwd=tmp_path).returncode == 0

@@ -7,6 +7,7 @@ from ._journal import Flight, Journal, JournalError, Trial
 from ._probe import probe
 from ._progress import Progress, clock, print_progress, progress_line
 from ._result import Result, RunError
+from ._settings import ForeignTypeError
 from ._study import Study
 from ._task import Circle, Origin, Pulse, Task
 
@@ -16,6 +17,7 @@ __all__ = [
     "Cost",
     "Episode",
     "Flight",
+    "ForeignTypeError",
     "Journal",
     "JournalError",
     "Origin",

@@ -60,7 +60,7 @@ class Result:
         Raises
         ------
         RunError
-            There is no run in it, or only its study script can make the study (the robot is a class of the user's).
+            There is no run in it, or only its study script can make a part of the study other than the robot.
         """
         from ._study import Study
 
@@ -70,7 +70,7 @@ class Result:
         settings = read_settings(folder)
         try:
             return cls(Study.from_settings(settings), folder)
-        except (ValueError, TypeError, AttributeError, ImportError) as error:
+        except (ValueError, TypeError, KeyError, AttributeError, ImportError) as error:
             raise RunError(f"the study of {folder} cannot be made from its study.json: {error}") from error
 
     @functools.cached_property

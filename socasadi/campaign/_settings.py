@@ -8,6 +8,10 @@ from typing import Any
 import numpy as np
 
 
+class ForeignTypeError(ValueError):
+    """A description holds an object of a class that a study script defines."""
+
+
 def describe(value: Any) -> Any:
     """``value`` as JSON data: numbers, text, lists, and for an object its type with what it was constructed from.
 
@@ -34,7 +38,7 @@ def rebuild(data: Any) -> Any:
 
     Raises
     ------
-    ValueError
+    ForeignTypeError
         It holds a type that is not socasadi's own: only the study's script can make that.
     """
     if isinstance(data, list):
@@ -46,7 +50,7 @@ def rebuild(data: Any) -> Any:
         return fields
     module, _, name = data["type"].rpartition(".")
     if module.split(".")[0] != "socasadi":
-        raise ValueError(f"the run uses {data['type']}, which only its study script can make; give the script")
+        raise ForeignTypeError(f"{data['type']} can only be made by the study script that defines it")
     return getattr(importlib.import_module(module), name)(**fields)
 
 
@@ -63,5 +67,6 @@ def differences(old: Any, new: Any, path: str = "") -> list[str]:
 
 def _public_name(kind: type) -> str:
     """Where a user would import a type from: the first package above its private module."""
-    parts = [part for part in kind.__module__.split(".") if not part.startswith("_") or part == "__main__"]
+    # A study script is a module without a name of its own, whether Python or the command runs it.
+    parts = [part for part in kind.__module__.split(".") if not part.startswith("_")] or ["script"]
     return ".".join([*parts, kind.__qualname__])

@@ -9,11 +9,12 @@ import numpy as np
 from ..mpc import LinearMPC, weight_matrix
 from ..plant import Plant
 from ..tune import Optimizer, Search, SobolSearch, Space
+from ._absent import AbsentPlant
 from ._campaign import run_campaign
 from ._cost import Cost
 from ._progress import Progress, print_progress
 from ._result import Result
-from ._settings import describe, rebuild
+from ._settings import ForeignTypeError, describe, rebuild
 from ._task import Task
 
 SearchName = Literal["bayesian", "paper", "sobol"]
@@ -102,8 +103,18 @@ class Study:
 
     @classmethod
     def from_settings(cls, settings: dict[str, Any]) -> "Study":
-        """The study that ``settings`` describe; ValueError when a part of it is not socasadi's own."""
-        return rebuild(settings)
+        """The study that ``settings`` describe.
+
+        A robot that a study script defines is stood for by one that cannot be flown; any other part of that kind
+        raises :class:`ForeignTypeError`.
+        """
+        parts = {name: rebuild(value) for name, value in settings.items() if name not in ("type", "plant")}
+        try:
+            plant = rebuild(settings["plant"])
+        except ForeignTypeError:
+            mpc = parts["mpc"]
+            plant = AbsentPlant(settings["plant"]["type"], mpc.sample_time, mpc.inputs, mpc.outputs)
+        return cls(plant=plant, **parts)
 
     def optimizer(self) -> Search:
         """A fresh search, before any trial."""

@@ -194,9 +194,16 @@ class TestRunFolder:
         assert again.mpc == study.mpc
         assert again.plant.rod == study.plant.rod
 
-    def test_a_robot_of_the_users_own_can_only_be_made_by_the_script(self, toy_study, tmp_path):
-        toy_study.run(tmp_path / "run", progress=None)
-        with pytest.raises(RunError, match="which only its study script can make"):
+    def test_a_robot_of_the_users_own_need_not_be_there_to_read_its_run(self, toy_study, tmp_path):
+        run = replace(toy_study, task=Circle(duration=1.0), iterations=0).run(tmp_path / "run", progress=None)
+        opened = Result.open(tmp_path / "run")
+        assert opened.best.J == run.best.J
+        with pytest.raises(ValueError, match=r"conftest\.ToyPlant can only be made by the study script"):
+            opened.study.plant.reset()
+
+    def test_a_task_of_the_users_own_must_be(self, toy_study, tmp_path):
+        replace(toy_study, iterations=0).run(tmp_path / "run", progress=None)
+        with pytest.raises(RunError, match=r"conftest\.ShortCircle can only be made by the study script"):
             Result.open(tmp_path / "run")
 
     @pytest.mark.parametrize("content", ["", "{}", "{nonsense"])
