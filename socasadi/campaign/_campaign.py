@@ -26,9 +26,14 @@ _MAY_DIFFER = ("iterations", "verifications")
 
 def run_campaign(study: "Study", folder: Path, *, resume: bool, progress: Callable[[Progress], None] | None) -> Result:
     """Ask, build, fly, score, store, tell, until the study has its trials; see :meth:`Study.run`."""
-    _prepare(study, folder, resume)
+    _check_folder(study, folder, resume)
     with Journal(journal_path(folder), writer=True) as journal:
         trials, search, clock = journal.trials(), study.optimizer(), Clock()
+        if len(trials) > study.trials:
+            raise RunError(f"{folder} holds {len(trials)} trials already; ask for no fewer, not for {study.trials}")
+        _write_settings(study, folder)
+        if prepare := getattr(study.plant, "prepare", None):
+            prepare()
         for trial in trials:
             _tell(search, trial)
         while len(trials) < study.trials:
@@ -42,7 +47,7 @@ def run_campaign(study: "Study", folder: Path, *, resume: bool, progress: Callab
     return Result(study, folder)
 
 
-def _prepare(study: "Study", folder: Path, resume: bool) -> None:
+def _check_folder(study: "Study", folder: Path, resume: bool) -> None:
     """Make the run folder, or see that it is this study's."""
     if folder.exists() and not folder.is_dir():
         raise RunError(f"{folder} is a file; name a folder for the run")
@@ -55,6 +60,9 @@ def _prepare(study: "Study", folder: Path, resume: bool) -> None:
         if changed:
             raise RunError(f"{folder} holds a run with other settings: {'; '.join(changed)}")
     folder.mkdir(parents=True, exist_ok=True)
+
+
+def _write_settings(study: "Study", folder: Path) -> None:
     about = {
         "settings": study.settings,
         "versions": {

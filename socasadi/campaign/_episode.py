@@ -4,6 +4,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..model import Record
 from ..mpc import Controller
@@ -73,7 +74,7 @@ def fly(plant: Plant, controller: Controller, task: Task, *, seed: int, time_lim
     deadline = time.monotonic() + time_limit
     try:
         with flight.timing("plant"):
-            y = plant.reset(task.start, seed=seed, tension_bounds=mpc.input_bounds)
+            y = measured(plant, plant.reset(task.start, seed=seed, tension_bounds=mpc.input_bounds))
         flight.begin(y)
         controller.reset(plant.tension)
         for t in range(samples):
@@ -84,11 +85,22 @@ def fly(plant: Plant, controller: Controller, task: Task, *, seed: int, time_lim
                 u = controller.step(y, wanted)
             force = {} if task.pulse is None else {"tip_force": task.pulse.at(t * mpc.sample_time)}
             with flight.timing("plant"):
-                y = plant.step(u, **force)
+                y = measured(plant, plant.step(u, **force))
             flight.note(u, y)
     except Exception as error:  # whatever a plant raises is a result of the experiment
         return flight.end(controller.info.fallbacks, failure=f"{type(error).__name__}: {error}")
     return flight.end(controller.info.fallbacks)
+
+
+def measured(plant: Plant, y: ArrayLike) -> np.ndarray:
+    """What a plant returned, as an array of one's own (plants may use theirs again); ValueError when it is no output."""
+    try:
+        values = np.array(y, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"the plant returned {y!r} for its outputs; ({plant.outputs},) numbers are needed") from None
+    if values.shape != (plant.outputs,):
+        raise ValueError(f"the plant returned outputs of shape {values.shape}; ({plant.outputs},) is needed")
+    return values
 
 
 class _Flight:
@@ -120,7 +132,7 @@ class _Flight:
     def _see(self, y: np.ndarray) -> None:
         if len(self.output) % _SHAPE_EVERY == 0 and (shape := getattr(self.plant, "shape", None)):
             self.shapes.append(shape(_SHAPE_POINTS))
-        self.truth.append(getattr(self.plant, "true_output", y))
+        self.truth.append(np.array(getattr(self.plant, "true_output", y), dtype=float))
         self.output.append(y)
 
     def end(self, fallbacks: int, failure: str | None = None) -> Episode:

@@ -4,9 +4,11 @@ import io
 import json
 import os
 import sqlite3
+import zlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -111,7 +113,8 @@ class Journal:
         self._lock = _lock(path) if writer else None
         if not writer and not path.exists():
             raise JournalError(f"there is no journal at {path}")
-        fresh = not path.exists()
+        # A process that is killed at once may leave an empty file behind.
+        fresh = not path.exists() or path.stat().st_size == 0
         with self._reading():
             self._database = sqlite3.connect(
                 f"{path.resolve().as_uri()}?mode={'rwc' if writer else _read_mode(path)}", uri=True
@@ -169,10 +172,13 @@ class Journal:
         """All trials in their order, without their episodes."""
         query = "SELECT number, phase, theta, score, failure, started, seconds FROM trial ORDER BY number"
         with self._reading():
-            return [
+            trials = [
                 Trial(number, phase, np.array(json.loads(theta)), _score(score), failure, started, json.loads(seconds))
                 for number, phase, theta, score, failure, started, seconds in self._database.execute(query)
             ]
+            if [trial.number for trial in trials] != list(range(1, len(trials) + 1)):
+                raise ValueError("trials are missing from their row")
+        return trials
 
     def episode(self, number: int) -> Episode | None:
         """Record of one trial; None when its controller could not even be made.
@@ -184,9 +190,10 @@ class Journal:
         """
         with self._reading():
             row = self._database.execute("SELECT episode FROM trial WHERE number = ?", (number,)).fetchone()
-            if row is None:
-                raise KeyError(f"{self.path} has no trial {number}")
-            return None if row[0] is None else _unpack(row[0])
+            episode = None if row is None or row[0] is None else _unpack(row[0])
+        if row is None:
+            raise KeyError(f"{self.path} has no trial {number}")
+        return episode
 
     def flights(self) -> dict[str, Flight]:
         """All flights beside the search, by name."""
@@ -201,7 +208,7 @@ class Journal:
     def _reading(self) -> Iterator[None]:
         try:
             yield
-        except (sqlite3.DatabaseError, json.JSONDecodeError, ValueError) as error:
+        except (sqlite3.DatabaseError, ValueError, TypeError, KeyError, EOFError, zlib.error, BadZipFile) as error:
             raise JournalError(
                 f"{self.path} is damaged or no journal of socasadi ({error}); "
                 "restore it from a copy, or start anew in another folder"
@@ -212,7 +219,7 @@ class Journal:
         try:
             with self._database:
                 yield
-        except sqlite3.OperationalError as error:
+        except sqlite3.Error as error:
             raise JournalError(f"{self.path} cannot be written ({error}); what was stored before is safe") from error
 
 

@@ -2,6 +2,7 @@ import numpy as np
 
 from ..model import Record
 from ..plant import Plant
+from ._episode import measured
 
 
 def probe(
@@ -41,6 +42,6 @@ def probe(
     samples, held = round(duration / plant.sample_time), round(hold / plant.sample_time)
     steps = np.random.default_rng(seed).uniform(-share, share, (-(-samples // held), plant.inputs))
     tension = np.repeat((lower + upper) / 2 + steps * (upper - lower) / 2, held, axis=0)[:samples]
-    output = [plant.reset(seed=seed, tension_bounds=input_bounds)]
-    output += [plant.step(row) for row in tension]
+    output = [measured(plant, plant.reset(seed=seed, tension_bounds=input_bounds))]
+    output += [measured(plant, plant.step(row)) for row in tension]
     return Record(plant.sample_time, tension, np.array(output))

@@ -49,11 +49,12 @@ def progress_line(progress: Progress) -> str:
     """The line: trial, its J, the best J, time elapsed and remaining."""
     trial, best = progress.trial, progress.best
     outcome = f"J {trial.J:12.5g}" if trial.J is not None else f"{'failed':>14}"
+    reason = f"  {trial.failure}" if trial.failure else ""
     incumbent = f"best {best.J:10.5g} (trial {best.number})" if best is not None else "no success yet"
     width = len(str(progress.total))
     return (
         f"trial {trial.number:{width}}/{progress.total}  {outcome}  {incumbent}  "
-        f"{clock(progress.elapsed)} elapsed, {clock(progress.remaining)} left"
+        f"{clock(progress.elapsed)} elapsed, {clock(progress.remaining)} left{reason}"
     )
 
 

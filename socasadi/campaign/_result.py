@@ -31,7 +31,7 @@ def read_settings(folder: Path) -> dict:
         return json.loads(path.read_text())["settings"]
     except FileNotFoundError:
         raise RunError(f"{folder} is no run folder: it has no study.json") from None
-    except (json.JSONDecodeError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError) as error:
         raise RunError(f"{path} is damaged ({error!r}); restore it from a copy") from error
 
 

@@ -1,6 +1,8 @@
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 
@@ -22,10 +24,11 @@ class Pulse:
     force: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.time) and self.time >= 0 and math.isfinite(self.duration) and self.duration > 0):
-            raise ValueError(f"a pulse starts at 0 s or later and lasts, not from {self.time} for {self.duration} s")
-        if len(self.force) != 3 or not all(math.isfinite(component) for component in self.force):
-            raise ValueError(f"the force of a pulse is three finite numbers, not {self.force}")
+        if not (_number(self.time) and self.time >= 0 and _number(self.duration) and self.duration > 0):
+            raise ValueError(
+                f"a pulse starts at 0 s or later and lasts, not from {self.time!r} for {self.duration!r} s"
+            )
+        _vector("the force of a pulse", self.force, 3)
 
     def at(self, time: float) -> tuple[float, float, float]:
         """Force during a sample that starts at ``time``, N."""
@@ -34,11 +37,12 @@ class Pulse:
         return self.force if inside else (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Task(ABC):
     """What the outputs have to do: a reference over time, from where, and how long.
 
-    A task of one's own is a frozen dataclass that inherits this one and defines :meth:`reference`.
+    A task of one's own is a frozen dataclass that inherits this one and defines :meth:`reference`. Arguments are given
+    by name.
 
     Parameters
     ----------
@@ -52,8 +56,9 @@ class Task(ABC):
     pulse: Pulse | None = None
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.duration) and self.duration > 0):
-            raise ValueError(f"duration of a task must be positive, not {self.duration} s")
+        _positive("duration of a task", self.duration)
+        if not (self.pulse is None or isinstance(self.pulse, Pulse)):
+            raise TypeError(f"pulse of a task is a Pulse or None, not {self.pulse!r}")
 
     @property
     def start(self) -> tuple[float, ...] | None:
@@ -72,7 +77,7 @@ class Task(ABC):
         return count
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Origin(Task):
     """Scenario 1 of the paper: released at rest from a bent pose, the tip goes to the origin and stays.
 
@@ -84,6 +89,10 @@ class Origin(Task):
 
     tip: tuple[float, float] = (-0.01, 0.04)
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _vector("tip of the origin task", self.tip, 2)
+
     @property
     def start(self) -> tuple[float, ...]:
         return self.tip
@@ -92,7 +101,7 @@ class Origin(Task):
         return np.zeros((len(time), len(self.tip)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Circle(Task):
     """Scenario 2 of the paper: the tip, at first at the origin, follows a circle about it.
 
@@ -111,10 +120,23 @@ class Circle(Task):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("radius", "period"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise ValueError(f"{name} of a circle must be positive, not {getattr(self, name)}")
+        _positive("radius of a circle", self.radius)
+        _positive("period of a circle", self.period)
 
     def reference(self, time: np.ndarray) -> np.ndarray:
         angle = 2 * np.pi * np.asarray(time) / self.period
         return self.radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _number(value: object) -> bool:
+    return isinstance(value, Real) and math.isfinite(value)
+
+
+def _positive(what: str, value: float) -> None:
+    if not (_number(value) and value > 0):
+        raise ValueError(f"{what} must be positive, not {value!r}")
+
+
+def _vector(what: str, values: Sequence[float], size: int) -> None:
+    if not (isinstance(values, Sequence | np.ndarray) and len(values) == size and all(map(_number, values))):
+        raise ValueError(f"{what} is {size} finite numbers, not {values!r}")

@@ -22,6 +22,10 @@ TOLERANCE = 1e-4
 iterating at a residual, so that its answers are good to about 1e-6 of the input bound."""
 
 
+_TEMPLATES = ("controller_data.h", "episode.h", "README.md")
+_GENERATED = (*_TEMPLATES, "law.c", "law.h", "osqp")
+
+
 class ExportError(RuntimeError):
     """A controller that cannot be exported as asked, or whose C does not agree with Python."""
 
@@ -44,15 +48,21 @@ def export(record: ControllerRecord, folder: str | Path, *, real: str = "double"
     Raises
     ------
     ExportError
-        Another ``real`` or ``solver`` is asked for, or the folder holds something else.
+        Another ``real`` or ``solver`` is asked for, or the folder holds files of others by the same names.
     """
     if real != "double":
         raise ExportError(f"real={real!r} cannot be exported yet: OSQP is used in double precision; use real='double'")
     if solver != "osqp":
         raise ExportError(f"solver={solver!r} cannot be exported yet; use solver='osqp'")
     folder = Path(folder)
-    if folder.exists() and any(folder.iterdir()) and not (folder / "controller_data.h").exists():
-        raise ExportError(f"{folder} holds something that is no exported controller; choose another folder")
+    sources = list(files("socasadi.export").joinpath("c").iterdir())
+    names = {*(source.name for source in sources), *_GENERATED}
+    if folder.exists() and not folder.is_dir():
+        raise ExportError(f"{folder} is a file; name a folder for the C files")
+    if not (folder / "controller_data.h").exists() and (others := sorted(n for n in names if (folder / n).exists())):
+        raise ExportError(
+            f"{folder} has files of the same names that are not an export's ({', '.join(others)}); choose another"
+        )
     (folder / "osqp").mkdir(parents=True, exist_ok=True)
     mpc = dataclasses.replace(record.mpc, backend="osqp")
     design = mpc.design(record.system)
@@ -61,7 +71,7 @@ def export(record: ControllerRecord, folder: str | Path, *, real: str = "double"
     laws.add(control_law(mpc, design))
     laws.add(control_law(mpc, design, with_qp=False))
     laws.generate(f"{folder}/")
-    for source in files("socasadi.export").joinpath("c").iterdir():
+    for source in sources:
         (folder / source.name).write_text(source.read_text())
     _copy_osqp(folder / "osqp")
 
@@ -85,7 +95,7 @@ def export(record: ControllerRecord, folder: str | Path, *, real: str = "double"
         "machine": f"{platform.system()} on {platform.machine()}",
         "stack": f"{8 * _working_numbers(folder / 'law.h') / 1024:.0f}",
     }
-    for name in ("controller_data.h", "episode.h", "README.md"):
+    for name in _TEMPLATES:
         (folder / name).write_text(_template(name).render(facts))
     return folder
 

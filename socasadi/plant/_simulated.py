@@ -100,6 +100,16 @@ class SimulatedPlant:
         """Positions (n, 3), m, of ``n`` points evenly spaced along the rod now."""
         return self.rod.centreline(self._running()[: self.rod.dof], n)
 
+    def prepare(self) -> None:
+        """Build and compile what a step needs, which the first step would do otherwise.
+
+        Raises
+        ------
+        CompilationError
+            The C compiler rejected the code.
+        """
+        _ = self._advance
+
     def reset(
         self, tip: ArrayLike | None = None, *, seed: int | None = None, tension_bounds: tuple[Any, Any] = (-inf, inf)
     ) -> np.ndarray:

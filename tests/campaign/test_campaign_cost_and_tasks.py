@@ -80,9 +80,11 @@ class TestTasks:
         [
             (lambda: Circle(radius=-0.05), "radius of a circle must be positive, not -0.05"),
             (lambda: Circle(period=0.0), "period of a circle must be positive"),
-            (lambda: Origin(duration=float("nan")), "duration of a task must be positive, not nan s"),
+            (lambda: Circle(radius="0.05"), "radius of a circle must be positive, not '0.05'"),
+            (lambda: Origin(tip=(float("nan"), 0.0)), "tip of the origin task is 2 finite numbers"),
+            (lambda: Origin(duration=float("nan")), "duration of a task must be positive, not nan"),
             (lambda: Pulse(time=0, duration=0, force=(0, 0, 0)), "a pulse starts"),
-            (lambda: Pulse(time=0, duration=1, force=(0, float("inf"), 0)), "three finite numbers"),
+            (lambda: Pulse(time=0, duration=1, force=(0, float("inf"), 0)), "3 finite numbers"),
             (lambda: replace(Circle(), duration=0.01).samples(0.05), "shorter than one sample"),
         ],
     )

@@ -127,10 +127,15 @@ def test_what_cannot_be_exported_yet_is_said(tmp_path):
     assert not (tmp_path / "c").exists()
 
 
-def test_a_folder_with_other_things_in_it_is_left_alone(tmp_path):
-    (tmp_path / "thesis.tex").write_text("")
-    with pytest.raises(ExportError, match="holds something that is no exported controller"):
+def test_no_file_of_somebody_elses_is_written_over(tmp_path):
+    (tmp_path / "thesis.tex").write_text("all of it")
+    (tmp_path / "Makefile").write_text("mine")
+    with pytest.raises(ExportError, match=r"files of the same names that are not an export's \(Makefile\)"):
         export(record(LinearMPC(Modal()), samples=2), tmp_path)
+    (tmp_path / "Makefile").unlink()
+    export(record(LinearMPC(Modal()), samples=2), tmp_path)
+    export(record(LinearMPC(Modal()), samples=3), tmp_path)
+    assert (tmp_path / "thesis.tex").read_text() == "all of it"
 
 
 def test_without_a_compiler_the_folder_is_written_and_the_reason_said(folder, monkeypatch):
