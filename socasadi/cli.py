@@ -1,8 +1,10 @@
 """The command ``socasadi``."""
 
 import runpy
+import shlex
 import sys
 import time
+import traceback
 import warnings
 from contextlib import contextmanager
 from dataclasses import replace
@@ -12,7 +14,7 @@ from typing import Annotated
 import numpy as np
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, TextColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
 from rich.table import Table
 
@@ -28,6 +30,7 @@ from .campaign import (
     clock,
     progress_line,
 )
+from .codegen import CompilationError
 from .export import ExportError, build_and_replay
 from .report import figures, save_figures
 
@@ -118,7 +121,7 @@ def main() -> None:
     warnings.showwarning = lambda message, *_, **__: print(f"socasadi: {message}", file=sys.stderr)
     try:
         app()
-    except (RunError, JournalError, ExportError, ValueError, TypeError, OSError) as error:
+    except (RunError, JournalError, ExportError, CompilationError, ValueError, TypeError, OSError) as error:
         print(f"socasadi: {error}", file=sys.stderr)
         sys.exit(1)
 
@@ -144,14 +147,23 @@ def _run(study: Study, folder: Path, resume: bool) -> None:
 def _again(script: Path, folder: Path, iterations: int | None, seed: int | None) -> str:
     """The command that goes on with a stopped run."""
     options = {"--iterations": iterations, "--seed": seed, "--out": folder}
-    given = [f"{name} {value}" for name, value in options.items() if value is not None]
-    return " ".join(["socasadi run", str(script), *given, "--resume"])
+    given = [f"{name} {shlex.quote(str(value))}" for name, value in options.items() if value is not None]
+    return " ".join(["socasadi run", shlex.quote(str(script)), *given, "--resume"])
 
 
 def _load(script: Path) -> Study:
     if not script.is_file():
         raise RunError(f"there is no study script {script}")
-    study = runpy.run_path(str(script), run_name="__study__").get("study")
+    # As when Python runs it: the script may import what lies beside it.
+    sys.path.insert(0, str(script.parent))
+    try:
+        study = runpy.run_path(str(script), run_name="__study__").get("study")
+    except SyntaxError as error:
+        raise RunError(f"{error.filename}, line {error.lineno}: {error.msg}") from error
+    except Exception as error:
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(script)]
+        place = f"{script}, line {lines[-1]}" if lines else str(script)
+        raise RunError(f"{place}: {type(error).__name__}: {error}") from error
     if not isinstance(study, Study):
         raise RunError(f"{script} defines no `study`: let it make one, study = Study(plant=..., mpc=..., task=...)")
     return study
@@ -170,15 +182,17 @@ def _replay(folder: Path) -> str:
 @contextmanager
 def _progress(title: str):
     """A reporter of trials: a bar on a terminal, and one line a trial elsewhere."""
+    out.print(f"{title}:")
     if not out.is_terminal:
-        out.print(f"{title}:")
         yield lambda progress: out.print(progress_line(progress))
         return
-    with Bar(TextColumn("{task.description}"), BarColumn(20), TextColumn("{task.fields[line]}"), console=out) as bar:
-        task = bar.add_task(title, total=None, line="")
+    with Bar(BarColumn(12), MofNCompleteColumn(), TextColumn("{task.description}"), console=out) as bar:
+        task = bar.add_task("", total=None)
 
         def report(progress: Progress) -> None:
-            bar.update(task, total=progress.total, completed=progress.done, line=progress_line(progress))
+            bar.update(
+                task, total=progress.total, completed=progress.done, description=progress_line(progress, short=True)
+            )
 
         yield report
 

@@ -93,7 +93,7 @@ def fly(plant: Plant, controller: Controller, task: Task, *, seed: int, time_lim
 
 
 def measured(plant: Plant, y: ArrayLike) -> np.ndarray:
-    """What a plant returned, as an array of one's own (plants may use theirs again); ValueError when it is no output."""
+    """What a plant returned, as an array of one's own, since plants may use theirs again; ValueError if no output."""
     try:
         values = np.array(y, dtype=float)
     except (TypeError, ValueError):

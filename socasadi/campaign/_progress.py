@@ -45,16 +45,21 @@ def print_progress(progress: Progress) -> None:
     print(progress_line(progress), flush=True)
 
 
-def progress_line(progress: Progress) -> str:
-    """The line: trial, its J, the best J, time elapsed and remaining."""
+def progress_line(progress: Progress, *, short: bool = False) -> str:
+    """The line: trial, its J, the best J, time elapsed and remaining; ``short`` for beside a bar that counts trials."""
     trial, best = progress.trial, progress.best
-    outcome = f"J {trial.J:12.5g}" if trial.J is not None else f"{'failed':>14}"
-    reason = f"  {trial.failure}" if trial.failure else ""
-    incumbent = f"best {best.J:10.5g} (trial {best.number})" if best is not None else "no success yet"
+    times = clock(progress.elapsed), clock(progress.remaining)
+    if short:
+        outcome = "failed" if trial.J is None else f"J {trial.J:.4g}"
+        incumbent = "no success yet" if best is None else f"best {best.J:.4g} (trial {best.number})"
+        return f"{outcome:12} {incumbent:24} {times[0]} + {times[1]} left"
     width = len(str(progress.total))
+    outcome = f"J {trial.J:12.5g}" if trial.J is not None else f"{'failed':>14}"
+    incumbent = f"best {best.J:10.5g} (trial {best.number})" if best is not None else "no success yet"
+    reason = f"  {trial.failure}" if trial.failure else ""
     return (
         f"trial {trial.number:{width}}/{progress.total}  {outcome}  {incumbent}  "
-        f"{clock(progress.elapsed)} elapsed, {clock(progress.remaining)} left{reason}"
+        f"{times[0]} elapsed, {times[1]} left{reason}"
     )
 
 

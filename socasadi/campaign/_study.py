@@ -17,6 +17,8 @@ from ._result import Result
 from ._settings import ForeignTypeError, describe, rebuild
 from ._task import Task
 
+_MEMBERS = ("sample_time", "inputs", "outputs", "tension", "reset", "step")
+
 SearchName = Literal["bayesian", "paper", "sobol"]
 
 
@@ -65,6 +67,12 @@ class Study:
     time_limit: float = 60.0
 
     def __post_init__(self) -> None:
+        kinds = {"plant": Plant, "mpc": LinearMPC, "task": Task, "cost": Cost}
+        for name, kind in kinds.items():
+            if not isinstance(getattr(self, name), kind):
+                missing = sorted(m for m in _MEMBERS if not hasattr(self.plant, m)) if name == "plant" else []
+                lacks = f": it lacks {', '.join(missing)}" if missing else ""
+                raise TypeError(f"{name} of a study is a {kind.__name__}, not {getattr(self, name)!r}{lacks}")
         plant, mpc = self.plant, self.mpc
         for name, of_plant, of_mpc in (
             ("inputs", plant.inputs, mpc.inputs),
@@ -77,8 +85,8 @@ class Study:
             value = getattr(self, name)
             if not isinstance(value, Integral) or value < least:
                 raise ValueError(f"{name} is an integer of at least {least}, not {value!r}")
-        if not self.time_limit > 0:
-            raise ValueError(f"time_limit must be positive, not {self.time_limit} s")
+        if not (isinstance(self.time_limit, int | float) and self.time_limit > 0):
+            raise ValueError(f"time_limit must be positive, not {self.time_limit!r} s")
         if self.search not in get_args(SearchName):
             raise ValueError(f"unknown search {self.search!r}; there are {', '.join(get_args(SearchName))}")
         rows = np.asarray(self.task.reference(np.zeros(1)))

@@ -81,10 +81,15 @@ def _compiler_version(path: str) -> str:
     return subprocess.run([path, "--version"], capture_output=True, text=True).stdout
 
 
+def _advice() -> str:
+    chosen = os.environ.get("CC")
+    return f"CC names {chosen!r}, which is not there" if chosen else "set CC, or install gcc"
+
+
 @functools.cache
 def _warn_interpreted() -> None:
     warnings.warn(
-        "no C compiler found (set CC, or install gcc): models run interpreted, more slowly but with the same results",
+        f"no C compiler found ({_advice()}): models run interpreted, more slowly but with the same results",
         RuntimeWarning,
         stacklevel=3,
     )

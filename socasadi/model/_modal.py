@@ -1,6 +1,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 
 import casadi as ca
 
@@ -69,8 +70,10 @@ class Modal(PredictionModel):
             "cable_offset": cable_offset,
         }
         for name, value in spec.items():
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be positive, not {value}")
+            if not (isinstance(value, Real) and math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} must be positive, not {value!r}")
+        if not (isinstance(damping_ratio, Sequence) and len(damping_ratio) == 2):
+            raise ValueError(f"damping_ratio is a pair of bounds, not {damping_ratio!r}")
         if not (math.isfinite(margin) and margin > 1):
             raise ValueError(f"margin is a factor above 1, not {margin}")
         frequency = 1.875104**2 * math.sqrt(bending_stiffness / (mass_per_length * length**4))

@@ -82,12 +82,12 @@ class LinearMPC:
     def __post_init__(self) -> None:
         if not isinstance(self.model, PredictionModel):
             raise TypeError(f"model is a prediction-model family such as Modal(), not {self.model!r}")
-        if not isinstance(self.horizon, Integral) or self.horizon < 1:
+        if not isinstance(self.horizon, Integral) or isinstance(self.horizon, bool) or self.horizon < 1:
             raise ValueError(f"horizon is a positive number of samples, not {self.horizon!r}")
         for name in ("sample_time", "slack_weight", "measurement_noise", "input_noise", "disturbance_noise"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be positive, not {value}")
+            if not (isinstance(value, int | float | np.number) and np.isfinite(value) and value > 0):
+                raise ValueError(f"{name} must be positive, not {value!r}")
         check_input_term(self.input_term)
         check_backend(self.backend)
         if self.terminal not in ("riccati", None):

@@ -11,7 +11,13 @@ Weight = float | Sequence[float] | Sequence[Sequence[float]]
 
 def weight_matrix(weight: Weight, size: int, name: str) -> np.ndarray:
     """The positive semidefinite (size, size) matrix that a number, a diagonal or a whole matrix stands for."""
-    values = np.asarray(weight, dtype=float)
+    try:
+        values = np.asarray(weight)
+    except ValueError:
+        values = np.asarray(None)
+    if values.dtype.kind not in "fiu":
+        raise ValueError(f"{name} is a number, {size} numbers or a ({size}, {size}) matrix, not {weight!r}")
+    values = values.astype(float)
     if values.ndim == 0:
         matrix = values * np.eye(size)
     elif values.shape == (size,):
@@ -45,10 +51,13 @@ def check_input_term(term: str) -> None:
 def bound_pair(bounds: tuple, size: int, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Lower and upper bounds, each (size,), from a pair of numbers or of vectors; they must be finite and ascend."""
     try:
-        lower, upper = (np.broadcast_to(np.asarray(side, dtype=float), (size,)).copy() for side in bounds)
+        sides = [np.asarray(side) for side in bounds]
+        if any(side.dtype.kind not in "fiu" for side in sides):
+            raise TypeError
+        lower, upper = (np.broadcast_to(side.astype(float), (size,)).copy() for side in sides)
     except (TypeError, ValueError):
         raise ValueError(
-            f"{name} is a pair (lower, upper) of numbers or of {size} numbers each, not {bounds}"
+            f"{name} is a pair (lower, upper) of numbers or of {size} numbers each, not {bounds!r}"
         ) from None
     if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
         raise ValueError(f"{name} must be finite, not {bounds}")
