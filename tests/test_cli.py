@@ -119,6 +119,9 @@ def test_ctrl_c_says_how_to_go_on_and_going_on_finishes(tmp_path):
         (("run", "empty.py"), "empty.py defines no `study`"),
         (("run", "unknown.py"), "no preset is called 'papre'; there are paper, hanging, paper_literal"),
         (("run", "crossing.py"), "input_bounds cross: lower 10 is not below upper -10"),
+        (("run", "broken.py"), "broken.py, line 2: NameError: name 'stuudy' is not defined"),
+        (("run", "syntax.py"), "syntax.py, line 1: "),
+        (("run", "beside.py"), "beside.py defines no `study`"),
         (("run", "backend.py"), "unknown QP back end 'gurobi'; there are daqp, qpoases, osqp"),
         (("show", "nowhere"), "there is no run folder nowhere"),
         (("plot", "."), ". is no run folder: it has no study.json"),
@@ -127,6 +130,9 @@ def test_ctrl_c_says_how_to_go_on_and_going_on_finishes(tmp_path):
 )
 def test_a_mistake_is_answered_by_one_sentence(tmp_path, arguments, words):
     (tmp_path / "empty.py").write_text("")
+    (tmp_path / "broken.py").write_text("a = 1\nstuudy\n")
+    (tmp_path / "syntax.py").write_text("study = (\n")
+    (tmp_path / "beside.py").write_text("import empty\n")
     study(tmp_path, rod="papre", name="unknown.py")
     study(tmp_path, mpc="input_bounds=(10, -10)", name="crossing.py")
     study(tmp_path, mpc="backend='gurobi'", name="backend.py")

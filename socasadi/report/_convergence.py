@@ -5,21 +5,28 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from ..campaign import Trial
 from ._style import BLACK, BLUE, COLUMN, MM, ORANGE, legend_above, page
 
+# Costs above this multiple of the best are not resolved.
+_HIGHEST = 30
+
 
 def convergence(trials: list[Trial], baseline: list[Trial] | None = None) -> Figure:
     """Cost of each trial and the best so far; the baseline's best so far beside it."""
     figure, (axes,) = page(COLUMN, 62 * MM)
     axes.set_yscale("log")
+    known = [trial.J for trial in trials if trial.J is not None]
+    ceiling = _HIGHEST * min(known, default=1.0)
     for phase, label, marker, face in (("seed", "seed point", "s", "white"), ("search", "search", "o", BLUE)):
-        done = [(t.number, t.J) for t in trials if t.phase == phase and t.J is not None]
+        done = [(t.number, t.J) for t in trials if t.phase == phase and t.J is not None and ceiling >= t.J]
         if done:
             style = {"mfc": face, "mec": BLUE, "mew": 0.6, "ms": 2.8, "zorder": 2}
             axes.plot(*np.transpose(done), marker, label=label, **style)
+    # Failures have no cost, and what is far off would squeeze the rest: both stand on the upper edge.
+    beyond = [t.number for t in trials if t.J is not None and ceiling < t.J]
     failed = [t.number for t in trials if t.J is None]
-    if failed:
-        # Failures have no cost: they stand on the upper edge.
-        edge = axes.get_xaxis_transform()
-        axes.plot(failed, np.ones(len(failed)), "x", color=ORANGE, label="failed", transform=edge, clip_on=False)
+    for numbers, label, marker, colour in ((beyond, "off the scale", "^", BLUE), (failed, "failed", "x", ORANGE)):
+        if numbers:
+            edge = {"transform": axes.get_xaxis_transform(), "clip_on": False, "ls": "", "mew": 0.6}
+            axes.plot(numbers, np.ones(len(numbers)), marker=marker, mfc="white", mec=colour, label=label, **edge)
     incumbent = best_so_far(trials)
     axes.step(np.arange(1, len(trials) + 1), incumbent, where="post", color=BLACK, label="best so far", zorder=4)
     if baseline:
@@ -42,13 +49,13 @@ def convergence(trials: list[Trial], baseline: list[Trial] | None = None) -> Fig
         )
     axes.yaxis.set_major_locator(LogLocator(numticks=8))
     axes.yaxis.set_minor_formatter(NullFormatter())
-    low, high = axes.get_ylim()
-    axes.set_ylim(low / 2, high)
+    if known:
+        axes.set_ylim(min(known) / 1.5, min(1.3 * max(known), ceiling))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlim(0, max(len(trials), len(baseline or [])) + 2)
     axes.set_xlabel("trial")
     axes.set_ylabel("cost J")
-    legend_above(axes, 2)
+    legend_above(axes, 3)
     return figure
 
 

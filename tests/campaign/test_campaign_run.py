@@ -287,3 +287,78 @@ def test_a_pulse_on_the_tip_is_felt(toy_study, tmp_path):
         return np.abs(episode.truth[11:14, 0]).max()
 
     assert farthest(Pulse(time=0.5, duration=0.1, force=(0, 50, 0))) > farthest(None) + 0.01
+
+
+class TestPlantsOfOnesOwn:
+    def test_one_that_uses_its_buffer_again_gives_the_same_run(self, toy_study, tmp_path):
+        class Driver(type(toy_study.plant)):
+            def measured(self):
+                self.buffer = getattr(self, "buffer", np.zeros(2))
+                self.buffer[:] = super().measured()
+                return self.buffer
+
+        study = replace(toy_study, iterations=0)
+        plain = study.run(tmp_path / "plain", progress=None)
+        driven = replace(study, plant=Driver()).run(tmp_path / "driven", progress=None)
+        assert [trial.J for trial in driven.trials] == [trial.J for trial in plain.trials]
+
+    @pytest.mark.parametrize("wrong", [np.zeros(3), np.zeros((2, 1)), None, "blind"])
+    def test_an_output_that_is_none_is_a_failure_that_says_so(self, toy_study, tmp_path, wrong):
+        class Odd(type(toy_study.plant)):
+            def step(self, tension, tip_force=None):
+                return wrong
+
+        study = replace(toy_study, plant=Odd(), seed_points=1, iterations=0)
+        (trial,) = study.run(tmp_path / "run", progress=None).trials
+        assert trial.failure.startswith("ValueError: the plant returned")
+
+    def test_what_prepare_raises_ends_the_run_before_any_trial(self, toy_study, tmp_path):
+        class Unbuilt(type(toy_study.plant)):
+            def prepare(self):
+                raise OSError("the serial port is taken")
+
+        with pytest.raises(OSError, match="serial port"):
+            replace(toy_study, plant=Unbuilt()).run(tmp_path / "run", progress=None)
+        assert len(toy_study.run(tmp_path / "again", progress=None).trials) == 12
+        with Journal(tmp_path / "run" / "journal.sqlite") as journal:
+            assert journal.trials() == []
+
+    def test_what_lacks_a_part_is_no_plant_and_the_part_is_named(self, toy_study):
+        class Half:
+            sample_time, inputs, outputs = 0.05, 3, 2
+
+        with pytest.raises(TypeError, match="it lacks reset, step, tension"):
+            replace(toy_study, plant=Half())
+
+
+class TestMoreDamage:
+    def test_a_refused_writer_changes_nothing(self, toy_study, tmp_path):
+        replace(toy_study, iterations=0).run(tmp_path / "run", progress=None)
+        before = (tmp_path / "run" / "study.json").read_bytes()
+        with Journal(tmp_path / "run" / "journal.sqlite", writer=True), pytest.raises(JournalError):
+            toy_study.run(tmp_path / "run", resume=True, progress=None)
+        assert (tmp_path / "run" / "study.json").read_bytes() == before
+
+    def test_fewer_trials_than_there_are_cannot_be_asked_for(self, toy_study, tmp_path):
+        replace(toy_study, iterations=1).run(tmp_path / "run", progress=None)
+        with pytest.raises(RunError, match="holds 7 trials already; ask for no fewer, not for 6"):
+            replace(toy_study, iterations=0).run(tmp_path / "run", resume=True, progress=None)
+
+    def test_a_missing_row_and_a_broken_record_are_said(self, toy_study, tmp_path):
+        study = replace(toy_study, task=Circle(duration=1.0), iterations=0)
+        result = study.run(tmp_path / "run", progress=None)
+        with sqlite3.connect(tmp_path / "run" / "journal.sqlite") as database:
+            (blob,) = database.execute("SELECT episode FROM trial WHERE number = 2").fetchone()
+            broken = blob[:200] + bytes(200) + blob[400:]
+            database.execute("UPDATE trial SET episode = ? WHERE number = 2", (broken,))
+        with pytest.raises(JournalError, match="damaged"):
+            result.episode(2)
+        with sqlite3.connect(tmp_path / "run" / "journal.sqlite") as database:
+            database.execute("DELETE FROM trial WHERE number = 3")
+        with pytest.raises(JournalError, match="trials are missing"):
+            study.run(tmp_path / "run", resume=True, progress=None)
+
+    def test_an_empty_journal_left_by_a_kill_is_begun_anew(self, toy_study, tmp_path):
+        replace(toy_study, iterations=0).run(tmp_path / "run", progress=None)
+        (tmp_path / "run" / "journal.sqlite").write_bytes(b"")
+        assert len(replace(toy_study, iterations=0).run(tmp_path / "run", resume=True, progress=None).trials) == 6
