@@ -31,7 +31,7 @@ from .campaign import (
     progress_line,
 )
 from .codegen import CompilationError
-from .export import ExportError, build_and_replay
+from .export import ExportError, NotBuiltError, build_and_replay
 from .report import figures, save_figures
 
 app = typer.Typer(
@@ -173,9 +173,7 @@ def _replay(folder: Path) -> str:
     """What `make test` said; where it cannot be built, why."""
     try:
         return build_and_replay(folder)
-    except ExportError as error:
-        if "was not built" not in str(error):
-            raise
+    except NotBuiltError as error:
         return str(error)
 
 

@@ -59,7 +59,10 @@ def _check_folder(study: "Study", folder: Path, resume: bool) -> None:
         ]
         if changed:
             raise RunError(f"{folder} holds a run with other settings: {'; '.join(changed)}")
+        return
     folder.mkdir(parents=True, exist_ok=True)
+    # First of all, so that a run that is killed at any later moment can be resumed.
+    _write_settings(study, folder)
 
 
 def _write_settings(study: "Study", folder: Path) -> None:

@@ -118,8 +118,10 @@ class _Flight:
     @contextmanager
     def timing(self, part: str) -> Iterator[None]:
         start = time.perf_counter()
-        yield
-        self.seconds[part] += time.perf_counter() - start
+        try:
+            yield
+        finally:
+            self.seconds[part] += time.perf_counter() - start
 
     def begin(self, y: np.ndarray) -> None:
         self.held = np.array(self.plant.tension, dtype=float)

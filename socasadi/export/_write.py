@@ -30,6 +30,10 @@ class ExportError(RuntimeError):
     """A controller that cannot be exported as asked, or whose C does not agree with Python."""
 
 
+class NotBuiltError(ExportError):
+    """An exported controller that is written but not built, for want of a compiler or make."""
+
+
 def export(record: ControllerRecord, folder: str | Path, *, real: str = "double", solver: str = "osqp") -> Path:
     """Write ``record`` as a folder of C: controller, data, QP solver, Makefile, and an episode to replay.
 
@@ -112,13 +116,15 @@ def build_and_replay(folder: str | Path) -> str:
 
     Raises
     ------
+    NotBuiltError
+        There is no C compiler or no make.
     ExportError
-        There is no C compiler or no make, or the build or the comparison failed; with what was said.
+        The build or the comparison failed; with what was said.
     """
     compiler = c_compiler()
     if compiler is None or shutil.which("make") is None:
         missing = "C compiler" if compiler is None else "make"
-        raise ExportError(
+        raise NotBuiltError(
             f"the exported controller was not built: no {missing} found; run 'make test' in {folder} where there is one"
         )
     run = subprocess.run(

@@ -14,14 +14,14 @@ of order two for any matrix A, and L-stable when A is the Jacobian of f. With
 stage has at hand) A holds all that is stiff in a rod, and eliminating the first block leaves one symmetric system
 with M + gamma h D + (gamma h)^2 K per stage: no Jacobian, no iteration.
 
-Why not CasADi's own linearly implicit integrator: for the preset "paper" (8 coordinates) after a step of 5 N, tip
-error at 1 s and time for one sample of 50 ms, compiled, on one core of a small server:
+Why not CasADi's own linearly implicit integrator: for the preset "paper" (8 coordinates) after a step of 5 N,
+studies/speed_rod.py gave, on one core of a small server, for the tip error at 1 s and the time of one compiled sample
+of 50 ms:
 
-    this method, substeps of 10 / 5 / 2.5 ms      7.2 / 1.8 / 0.45 um     45 / 91 / 180 us       1.2 s to compile
-    "rosenbrock", equal steps of 50 / 25 ms       1.4 / 0.45 um           295 / 550 us           50 s to compile
-    "rosenbrock", adaptive, tolerance 1e-3        below 1e-3 um           1,300 to 6,400 us      50 s to compile
+    this method, substeps of 10 / 5 / 2.5 ms      7.2 / 1.8 / 0.45 um     37 / 72 / 148 us       1 s to compile
+    "rosenbrock", one step of 50 ms               1.4 um                  346 us                 42 s to compile
 
-Three times quicker at the same accuracy, and compiled in a fortieth of the time.
+Four to five times quicker at like accuracy, and compiled in a fortieth of the time.
 
 The default substep, 1/250 of the period of the slowest mode of the straight rod, is 5 ms there. It follows the rod's
 stiffness and mass: a rod that vibrates faster gets shorter substeps, for accuracy; the stiff strains (stretch,

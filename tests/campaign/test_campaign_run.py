@@ -362,3 +362,18 @@ class TestMoreDamage:
         replace(toy_study, iterations=0).run(tmp_path / "run", progress=None)
         (tmp_path / "run" / "journal.sqlite").write_bytes(b"")
         assert len(replace(toy_study, iterations=0).run(tmp_path / "run", resume=True, progress=None).trials) == 6
+
+    def test_a_run_killed_before_its_first_trial_can_be_resumed(self, toy_study, tmp_path, monkeypatch):
+        import socasadi.campaign._campaign as campaign
+
+        class Killed(BaseException):
+            pass
+
+        def kill(*_, **__):
+            raise Killed
+
+        with monkeypatch.context() as patched:
+            patched.setattr(campaign, "Journal", kill)
+            with pytest.raises(Killed):
+                toy_study.run(tmp_path / "run", progress=None)
+        assert len(replace(toy_study, iterations=0).run(tmp_path / "run", resume=True, progress=None).trials) == 6

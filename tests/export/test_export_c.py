@@ -105,7 +105,7 @@ int main(void) {
 def test_whatever_comes_in_the_tensions_stay_inside_their_bounds_and_nothing_is_spoilt(folder):
     (folder / "hostile.c").write_text(HOSTILE)
     build_and_replay(folder)
-    compiler = ["cc", "-std=c99", "-O1", "-I.", "-Iosqp/include", "hostile.c", "libcontroller.a"]
+    compiler = [*(c_compiler() or []), "-std=c99", "-O1", "-I.", "-Iosqp/include", "hostile.c", "libcontroller.a"]
     subprocess.run([*compiler, "osqp/libosqpstatic.a", "-lm", "-o", "hostile"], cwd=folder, check=True)
     said = subprocess.run(["./hostile"], cwd=folder, capture_output=True, text=True, check=True).stdout
     assert said.split() == ["0", "1", "0"]
