@@ -1,6 +1,8 @@
 """The house: which room may import which, read from the imports themselves."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -26,19 +28,25 @@ LIBRARIES = {"codegen": {"platformdirs"}, "export": {"jinja2"}, "tune": {"thread
 GRANTED = {"plant": {"casadi"}, "export": {"casadi", "model"}}
 
 
-def imports(file: Path) -> set[str]:
-    """Names of the rooms and of the third-party packages that a file imports."""
+def modules(file: Path) -> set[tuple[str, ...]]:
+    """The absolute names, split at the dots, of the modules that a file imports."""
+    package = ("socasadi", *file.parent.relative_to(PACKAGE).parts)
     found = set()
     for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.level == 0:
-            found.add((node.module or "").split(".")[0])
-        elif isinstance(node, ast.ImportFrom) and node.level == 2:
-            found |= {node.module.split(".")[0]} if node.module else {alias.name for alias in node.names}
-    import sys
+            found |= {tuple(alias.name.split(".")) for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else ()
+            named = tuple(node.module.split(".")) if node.module else ()
+            found |= {(*base, *named)} if named else {(*base, alias.name) for alias in node.names}
+    return found
 
-    return {name for name in found if name not in sys.stdlib_module_names and name != "__future__"}
+
+def imports(file: Path) -> set[str]:
+    """Names of the other rooms and of the third-party packages that a file imports."""
+    own = file.relative_to(PACKAGE).parts[0]
+    names = {module[1] if module[0] == "socasadi" else module[0] for module in modules(file)}
+    return names - {own, "__future__"} - sys.stdlib_module_names
 
 
 def test_every_room_stands_in_the_table():
@@ -53,17 +61,20 @@ def test_arrows_run_one_way(room):
         assert imports(file) <= allowed, f"{file.relative_to(PACKAGE)} imports {imports(file) - allowed}"
 
 
-def test_no_private_module_is_imported_from_another_room():
+def test_private_modules_are_imported_only_within_their_own_folder():
     for file in PACKAGE.rglob("*.py"):
-        for node in ast.walk(ast.parse(file.read_text())):
-            if isinstance(node, ast.ImportFrom) and node.module and (node.level == 2 or "socasadi" in node.module):
-                parts = node.module.removeprefix("socasadi.").split(".")
-                assert not any(part.startswith("_") for part in parts), f"{file.name} reaches into {node.module}"
+        here = ("socasadi", *file.parent.relative_to(PACKAGE).parts)
+        for module in modules(file):
+            private = next((i for i, part in enumerate(module) if part.startswith("_")), None)
+            if module[0] == "socasadi" and private is not None:
+                assert here[:private] == module[:private], f"{file.name} reaches into {'.'.join(module)}"
+
+
+def test_within_the_rod_equations_follow_from_the_body_and_never_the_other_way():
+    for file in (PACKAGE / "rod" / "body").glob("*.py"):
+        assert not any(module[:3] == ("socasadi", "rod", "mechanics") for module in modules(file)), file.name
 
 
 def test_importing_the_package_leaves_the_slow_parts_for_later():
-    import subprocess
-    import sys
-
     code = "import sys, socasadi; print([m for m in ('GPy', 'matplotlib', 'rich', 'typer') if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"

@@ -1,23 +1,58 @@
-"""A geometrically exact Cosserat rod, strain-parametrised, as CasADi Functions: kinematics, statics, dynamics."""
+"""A geometrically exact Cosserat rod, strain-parametrised, as CasADi Functions: kinematics, statics, dynamics.
 
-from ._cable import Cable, cables_around
-from ._linear import Linearisation, Modes
-from ._material import Material, Section
-from ._model import RodModel
+``body`` holds what a rod is made of, ``mechanics`` the equations that follow, and :class:`Rod` puts them together.
+"""
+
 from ._rod import Rod
-from ._statics import Equilibrium, EquilibriumError
-from ._strain import Strain
+from .body import (
+    Basis,
+    BSpline,
+    Cable,
+    Chamber,
+    Converging,
+    DistributedLoad,
+    Division,
+    Drag,
+    Helix,
+    Legendre,
+    Material,
+    Payload,
+    PointLoad,
+    Section,
+    Strain,
+    Taper,
+    UserBasis,
+    cables_around,
+    piecewise_constant,
+    piecewise_linear,
+)
+from .mechanics import Equilibrium, EquilibriumError, Linearisation, Modes, RodModel
 
 __all__ = [
+    "BSpline",
+    "Basis",
     "Cable",
+    "Chamber",
+    "Converging",
+    "DistributedLoad",
+    "Division",
+    "Drag",
     "Equilibrium",
     "EquilibriumError",
+    "Helix",
+    "Legendre",
     "Linearisation",
     "Material",
     "Modes",
+    "Payload",
+    "PointLoad",
     "Rod",
     "RodModel",
     "Section",
     "Strain",
+    "Taper",
+    "UserBasis",
     "cables_around",
+    "piecewise_constant",
+    "piecewise_linear",
 ]

@@ -1,48 +1,92 @@
-from collections.abc import Sequence
+from collections.abc import Callable
 from math import isfinite
-from typing import SupportsFloat
+from typing import Any, SupportsFloat, TypeAlias
 
+import casadi as ca
 import numpy as np
 
-
-def finite(owner: str, **values: float) -> None:
-    """ValueError unless every value is a finite number."""
-    for name, value in values.items():
-        if not (_is_number(value) and isfinite(value)):
-            raise ValueError(f"{owner}: {name} is {value!r}, but must be a finite number")
+Number: TypeAlias = float | ca.SX
+"""A number, or an expression of the symbols that a rod has as parameters."""
 
 
-def positive(owner: str, **values: float) -> None:
-    """ValueError unless every value is a finite number above zero."""
-    for name, value in values.items():
-        if not (_is_number(value) and isfinite(value) and value > 0):
-            raise ValueError(f"{owner}: {name} is {value!r}, but must be a finite number above zero")
+def finite(owner: str, **values: Any) -> None:
+    """ValueError unless every value is a finite number, or symbolic."""
+    _demand(owner, values, lambda value: True, "a finite number")
 
 
-def not_negative(owner: str, **values: float) -> None:
-    """ValueError unless every value is a finite number, zero or above."""
-    for name, value in values.items():
-        if not (_is_number(value) and isfinite(value) and value >= 0):
-            raise ValueError(f"{owner}: {name} is {value!r}, but must be a finite number, zero or above")
+def positive(owner: str, **values: Any) -> None:
+    """ValueError unless every value is a finite number above zero, or symbolic."""
+    _demand(owner, values, lambda value: value > 0, "a finite number above zero")
+
+
+def not_negative(owner: str, **values: Any) -> None:
+    """ValueError unless every value is a finite number, zero or above, or symbolic."""
+    _demand(owner, values, lambda value: value >= 0, "a finite number, zero or above")
+
+
+def whole(owner: str, name: str, value: Any, least: int) -> None:
+    """ValueError unless ``value`` is a whole number, ``least`` or above."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise ValueError(f"{owner}: {name} is {value!r}, but must be a whole number, {least} or above")
+
+
+def symbolic(value: Any) -> bool:
+    """Whether ``value`` is, or holds, an expression of CasADi symbols."""
+    if isinstance(value, list | tuple):
+        return any(symbolic(item) for item in value)
+    return isinstance(value, ca.SX) and not value.is_constant()
 
 
 def vector(owner: str, name: str, value: object, size: int) -> np.ndarray:
     """``value`` as a float array (size,); ValueError when its shape is another or an entry is not finite."""
+    return _array(owner, name, value, (size,))
+
+
+def numbers(owner: str, name: str, value: Any, size: int) -> tuple[Any, ...]:
+    """``value`` as a tuple of ``size`` finite numbers or symbolic expressions: what a frozen dataclass keeps."""
+    if isinstance(value, ca.SX):
+        value = [entry if symbolic(entry) else float(entry) for entry in ca.vertsplit(ca.vec(value))]
+    if symbolic(value):
+        if len(value) != size:
+            raise ValueError(f"{owner}: {name} has {len(value)} entries, but must have {size}")
+        finite(owner, **{f"{name}[{i}]": entry for i, entry in enumerate(value)})
+        return tuple(value)
+    return tuple(vector(owner, name, value, size).tolist())
+
+
+def matrix(owner: str, name: str, value: Any, size: int) -> tuple[tuple[Any, ...], ...]:
+    """``value`` as ``size`` rows of ``size`` finite numbers or symbolic expressions; a vector is the diagonal."""
+    if isinstance(value, ca.SX):
+        value = [row.T for row in ca.vertsplit(value)] if value.shape[1] > 1 else ca.vertsplit(value)
+    rows = isinstance(value, list | tuple | np.ndarray) and len(value) == size
+    nested = rows and [isinstance(row, list | tuple | np.ndarray) or ca.SX(row).numel() > 1 for row in value]
+    if nested and all(nested):
+        return tuple(numbers(owner, f"{name}[{i}]", row, size) for i, row in enumerate(value))
+    if nested and not any(nested):
+        diagonal = numbers(owner, name, value, size)
+        return tuple(tuple(diagonal[i] if i == j else 0.0 for j in range(size)) for i in range(size))
+    return tuple(map(tuple, _array(owner, name, value, (size, size)).tolist()))
+
+
+def _array(owner: str, name: str, value: object, shape: tuple[int, ...]) -> np.ndarray:
+    count = " x ".join(map(str, shape))
     try:
         array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{owner}: {name} is {value!r}, but must be {size} numbers") from None
-    if array.shape != (size,):
-        raise ValueError(f"{owner}: {name} has shape {array.shape}, but must have shape ({size},)")
+    except (TypeError, ValueError, RuntimeError):
+        raise ValueError(f"{owner}: {name} is {value!r}, but must be {count} numbers") from None
+    if array.ndim == 0:
+        raise ValueError(f"{owner}: {name} is {value!r}, but must be {count} numbers")
+    if array.shape != shape:
+        raise ValueError(f"{owner}: {name} has shape {array.shape}, but must have shape {shape}")
     if not np.isfinite(array).all():
         raise ValueError(f"{owner}: {name} is {array.tolist()}, but must be finite")
     return array
 
 
-def numbers(owner: str, name: str, value: Sequence[float], size: int) -> tuple[float, ...]:
-    """Like :func:`vector`, as a tuple: what a frozen dataclass keeps."""
-    return tuple(vector(owner, name, value, size).tolist())
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, SupportsFloat) and not isinstance(value, bool)
+def _demand(owner: str, values: dict[str, Any], holds: Callable[[Any], bool], what: str) -> None:
+    for name, value in values.items():
+        if symbolic(value):
+            continue
+        number = isinstance(value, SupportsFloat) and not isinstance(value, bool)
+        if not (number and isfinite(float(value)) and holds(value)):
+            raise ValueError(f"{owner}: {name} is {value!r}, but must be {what}")

@@ -2,46 +2,68 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from math import inf
-from typing import Any
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
 
 from ..codegen import compiled
-from . import _step
-from ._cable import Cable, cables_around
-from ._checks import numbers, positive, vector
-from ._holding import Holding
-from ._linear import Linearisation, Modes, linearise, modes
-from ._material import Material, Section
-from ._model import RodModel
-from ._statics import Equilibrium, Statics
-from ._strain import Strain
+from . import mechanics
+from ._checks import matrix, numbers, symbolic, vector
+from .body import (
+    Cable,
+    Chamber,
+    DistributedLoad,
+    Division,
+    Drag,
+    Material,
+    Payload,
+    PointLoad,
+    Section,
+    Strain,
+    cables_around,
+)
+
+_ZERO = (0.0, 0.0, 0.0)
+_UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Rod:
     """A soft rod that bends, twists, stretches and shears without limit: a geometrically exact Cosserat rod.
 
-    It is clamped at the origin of the base frame and lies along +x when unloaded and straight. Cables in its
-    section pull it. The strain field is a sum of polynomials (:class:`Strain`), whose coefficients q (n,) with their
-    rates v (n,) are the state x = [q; v].
+    It is clamped at its base and lies along the base frame's +x when unloaded and straight. One or several
+    divisions, each with its section, material and strains, follow one another; cables and chambers in the section
+    drive it. The strain coordinates q (n,), those of the first division first, with their rates v (n,) are the state
+    x = [q; v].
 
     Parameters
     ----------
-    length
-        L, m.
-    section, material, strain
-        What it is made of, and which strains it has.
+    length, section, material, strain, quadrature_points
+        Of a rod of one division, as :class:`Division` has them. Given beside ``divisions``, they replace those
+        of every division.
     cables
-        In the order of the tensions.
+        :class:`Cable` and :class:`Chamber`, in the order of the inputs.
+    divisions
+        :class:`Division`, from the base to the tip, in place of the above.
     gravity
-        Acceleration (3,), m/s^2, base frame.
-    quadrature_points
-        Gauss-Legendre points along the rod.
+        Acceleration (3,), m/s^2, world frame.
+    base_rotation, base_position
+        The base frame in the world: rotation matrix (3, 3), its columns the base's axes, and position (3,), m. By
+        default the two frames are one.
+    payloads
+        :class:`Payload`, rigid bodies that the rod carries.
+    loads
+        :class:`PointLoad` and :class:`DistributedLoad`, constant.
+    drag
+        :class:`Drag` of the fluid around, or None.
+    parameters
+        CasADi SX symbols that moduli, dimensions of sections, damping, gravity, payloads, loads, cables or rest strain
+        are written with. They become the last argument p of every Function of :attr:`model` and of :meth:`step`, which
+        can be differentiated in it; a load that changes in time is such a parameter. :meth:`at` gives them values.
 
     Notes
     -----
@@ -51,43 +73,90 @@ class Rod:
     Raises
     ------
     ValueError
-        A value is out of range, or there are too few quadrature points for the strain's order, which would leave
-        the mass matrix singular. (A cable outside the section is only warned of: discs may carry it.)
+        A value is out of range. (A cable outside the section is only warned of: discs may carry it.)
+
+    Examples
+    --------
+    A silicone rod that three cables bend:
+
+    >>> silicone = Material(young=1e6, poisson=0.5, density=1000, damping=1e4)
+    >>> rod = Rod(0.6, Section.circle(0.03), silicone, Strain(bending_y=2, bending_z=2), cables_around(3, 0.02))
+    >>> rod.equilibrium(tension=[5, 0, 0]).tip[:2].round(3).tolist()
+    [0.599, 0.028]
+
+    An arm of two divisions, the second thinner, with a gripper, whose Young's modulus is to be identified:
+
+    >>> E = ca.SX.sym("E")
+    >>> rubber = Material(E, 0.5, 1100, damping=1e4)
+    >>> thick, thin = (Division(0.3, Section.circle(r), rubber, Strain(bending_y=1, bending_z=1)) for r in (0.03, 0.02))
+    >>> arm = Rod(divisions=(thick, thin), gravity=(0, 0, -9.81), payloads=(Payload(0.05),), parameters=(E,))
+    >>> arm.model.rhs
+    Function(rhs:(x[16],u[0],p)->(xdot[16]) MXFunction)
+    >>> arm.at([1e6]).equilibrium().tip[[0, 2]].round(3).tolist()
+    [0.439, -0.368]
     """
 
-    length: float
-    section: Section
-    material: Material
-    strain: Strain
-    cables: tuple[Cable, ...] = ()
-    gravity: tuple[float, ...] = (0.0, 0.0, 0.0)
-    quadrature_points: int = 6
+    divisions: tuple[Division, ...]
+    cables: tuple[Cable | Chamber, ...]
+    gravity: tuple[Any, ...]
+    base_rotation: tuple[tuple[float, ...], ...]
+    base_position: tuple[float, ...]
+    payloads: tuple[Payload, ...]
+    loads: tuple[PointLoad | DistributedLoad, ...]
+    drag: Drag | None
+    parameters: tuple[ca.SX, ...]
+    parameter_values: tuple[float, ...] | None
 
-    def __post_init__(self) -> None:
-        positive("Rod", length=self.length)
-        object.__setattr__(self, "length", float(self.length))
-        for name, kind in (("section", Section), ("material", Material), ("strain", Strain)):
-            if not isinstance(value := getattr(self, name), kind):
-                raise TypeError(f"Rod: {name} is {value!r}, but must be a {kind.__name__}")
-        object.__setattr__(self, "cables", tuple(self.cables))
-        object.__setattr__(self, "gravity", numbers("Rod", "gravity", self.gravity, 3))
-        fewest = max(self.strain.orders) + 1
-        points = self.quadrature_points
-        if isinstance(points, bool) or not isinstance(points, int) or points < fewest:
-            raise ValueError(
-                f"Rod: quadrature_points is {points!r}, but must be a whole number of at least {fewest} "
-                f"for strains up to order {fewest - 1}"
+    def __init__(
+        self,
+        length: float | None = None,
+        section: Any = None,
+        material: Material | None = None,
+        strain: Strain | None = None,
+        cables: Sequence[Cable | Chamber] = (),
+        *,
+        divisions: Sequence[Division] | Division = (),
+        gravity: Sequence[Any] = _ZERO,
+        base_rotation: Any = _UPRIGHT,
+        base_position: Sequence[float] = _ZERO,
+        payloads: Sequence[Payload] = (),
+        loads: Sequence[PointLoad | DistributedLoad] = (),
+        drag: Drag | None = None,
+        quadrature_points: int | None = None,
+        parameters: Sequence[ca.SX] = (),
+        parameter_values: Sequence[float] | None = None,
+    ) -> None:
+        given = {
+            name: value
+            for name, value in (
+                ("length", length),
+                ("section", section),
+                ("material", material),
+                ("strain", strain),
+                ("quadrature_points", quadrature_points),
             )
-        if self.section.half_widths is not None:
-            y_half, z_half = self.section.half_widths
-            for i, cable in enumerate(self.cables):
-                y, z = cable.path(0.0)[0][1:]
-                if (y / y_half) ** 2 + (z / z_half) ** 2 > 1 + 1e-9:
-                    warnings.warn(
-                        f"Rod: cable {i} runs at (y, z) = ({y:g}, {z:g}) m, outside the section, which reaches to "
-                        f"({y_half:g}, {z_half:g}) m; that is right only if discs carry it",
-                        stacklevel=3,
-                    )
+            if value is not None
+        }
+        put = object.__setattr__
+        put(self, "divisions", _divisions(divisions, given))
+        put(self, "cables", _all_of("cables", cables, (Cable, Chamber)))
+        put(self, "gravity", numbers("Rod", "gravity", gravity, 3))
+        put(self, "base_rotation", _rotation(base_rotation))
+        put(self, "base_position", numbers("Rod", "base_position", base_position, 3))
+        put(self, "payloads", _all_of("payloads", payloads, (Payload,)))
+        put(self, "loads", _all_of("loads", loads, (PointLoad, DistributedLoad)))
+        put(self, "drag", drag)
+        symbols = [parameters] if isinstance(parameters, ca.SX) else list(parameters)
+        put(self, "parameters", tuple(symbol for column in symbols for symbol in ca.vertsplit(ca.vec(column))))
+        put(self, "parameter_values", None)
+        if parameter_values is not None:
+            values = vector("Rod", "parameter_values", parameter_values, len(self.parameters))
+            put(self, "parameter_values", tuple(values.tolist()))
+        if drag is not None and not isinstance(drag, Drag):
+            raise TypeError(f"Rod: drag is {drag!r}, but must be a Drag or None")
+        self._check_places()
+        self._check_symbols()
+        self._warn_of_cables_outside()
 
     @classmethod
     def preset(cls, name: str) -> Rod:
@@ -121,23 +190,28 @@ class Rod:
         )
 
     @property
+    def length(self) -> float:
+        """Length of the unloaded rod, m."""
+        return sum(division.length for division in self.divisions)
+
+    @property
     def dof(self) -> int:
         """Number n of strain coordinates; the state has 2 n entries."""
-        return self.strain.dof
+        return sum(division.dof for division in self.divisions)
 
     @cached_property
-    def model(self) -> RodModel:
-        """All equations as CasADi Functions."""
-        return RodModel(self)
+    def model(self) -> mechanics.RodModel:
+        """All equations as CasADi Functions, those below and more."""
+        return mechanics.RodModel(self)
 
     @property
     def pose(self) -> ca.Function:
-        """CasADi Function (q, s) -> (4, 4) homogeneous pose at arc length s, m, base frame."""
+        """CasADi Function (q, s) -> (4, 4) homogeneous pose at arc length s, m, world frame."""
         return self.model.pose
 
     @property
     def tip(self) -> ca.Function:
-        """CasADi Function q -> (3,) tip position, m, base frame."""
+        """CasADi Function q -> (3,) tip position, m, world frame."""
         return self.model.tip
 
     @property
@@ -147,7 +221,7 @@ class Rod:
 
     @property
     def bias(self) -> ca.Function:
-        """CasADi Function (q, v) -> (n,) of inertia, gravity, elasticity and damping: M dv/dt + bias = actuation u."""
+        """CasADi Function (q, v) -> (n,): mass dv/dt + bias = actuation tension."""
         return self.model.bias
 
     @property
@@ -162,7 +236,7 @@ class Rod:
 
     @property
     def forced_rhs(self) -> ca.Function:
-        """CasADi Function (x, u, tip_force) -> (2 n,) dx/dt under a dead force (3,) N at the tip, base frame."""
+        """CasADi Function (x, u, tip_force) -> (2 n,) dx/dt under a dead force (3,) N at the tip, world frame."""
         return self.model.forced_rhs
 
     @property
@@ -173,33 +247,55 @@ class Rod:
     @property
     def stiffness(self) -> ca.DM:
         """Elastic stiffness matrix (n, n), constant."""
-        return self.model.stiffness
+        return self._valued.model.stiffness  # type: ignore[return-value]
 
     @property
     def damping_matrix(self) -> ca.DM:
         """Viscous damping matrix (n, n), constant."""
-        return self.model.damping_matrix
+        return self._valued.model.damping_matrix  # type: ignore[return-value]
+
+    @property
+    def neutral(self) -> np.ndarray:
+        """Inputs (cables,) that do nothing to the unloaded rod: zero, or the length that a cable has there, m."""
+        return self.statics.neutral
+
+    def at(self, values: Sequence[float] | np.ndarray) -> Rod:
+        """The rod with ``values`` for its :attr:`parameters`, in their order: a rod of numbers, ready to simulate."""
+        return replace(self, parameter_values=values)  # type: ignore[arg-type]
+
+    def in_base_frame(self, points: np.ndarray) -> np.ndarray:
+        """Points (..., 3) of the world, m, as the base sees them."""
+        return (points - np.array(self.base_position)) @ np.array(self.base_rotation)
 
     def centreline(self, q: Sequence[float] | np.ndarray, n: int = 50) -> np.ndarray:
-        """Positions (n, 3), m, of ``n`` points evenly spaced along the rod at coordinates ``q``."""
+        """Positions (n, 3), m, of ``n`` points evenly spaced along the rod at coordinates ``q``, world frame."""
         q = vector("Rod.centreline", "q", q, self.dof)
-        poses = self.pose.map(n)(ca.repmat(ca.DM(q), 1, n), ca.DM(np.linspace(0, self.length, n)).T).full()
+        poses = self._valued.pose.map(n)(ca.repmat(ca.DM(q), 1, n), ca.DM(np.linspace(0, self.length, n)).T).full()
         return poses[:3, 3::4].T
 
     def equilibrium(
         self,
         tension: Sequence[float] | np.ndarray | None = None,
-        tip_force: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
-        tip_moment: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
-    ) -> Equilibrium:
-        """Static equilibrium under constant loads, reached by increasing them (gravity too) from zero.
+        tip_force: Sequence[float] | np.ndarray = _ZERO,
+        tip_moment: Sequence[float] | np.ndarray = _ZERO,
+        *,
+        follower_force: Sequence[float] | np.ndarray = _ZERO,
+        follower_moment: Sequence[float] | np.ndarray = _ZERO,
+        lengths: Sequence[float] | np.ndarray | None = None,
+    ) -> mechanics.Equilibrium:
+        """Static equilibrium under constant loads, reached by increasing them together from zero.
 
         Parameters
         ----------
         tension
-            Cable tensions (cables,), N; None for slack cables.
+            Inputs (cables,): tensions, N, or what else cables and chambers take; None for :attr:`neutral`.
         tip_force, tip_moment
-            Dead loads (3,) at the tip, N and N m, base frame.
+            Dead loads (3,) at the tip, N and N m, world frame.
+        follower_force, follower_moment
+            Loads (3,) that turn with the tip section, N and N m, in its axes.
+        lengths
+            Lengths (cables,), m, that the cables are to have, in place of ``tension``: the equilibrium's ``tension``
+            says what that takes.
 
         Raises
         ------
@@ -207,17 +303,36 @@ class Rod:
             None was found.
         ValueError
             A load has the wrong shape or is not finite.
+
+        Examples
+        --------
+        >>> rod = Rod.preset("paper")
+        >>> rod.equilibrium(tip_force=(0, 0, -1)).tip[[0, 2]].round(3).tolist()
+        [0.588, -0.109]
+        >>> bent = rod.equilibrium(lengths=[0.59, 0.605, 0.605])
+        >>> bent.tension.round(2).tolist()
+        [17.67, -8.84, -8.84]
         """
         owner, cables = "Rod.equilibrium", len(self.cables)
-        tension = np.zeros(cables) if tension is None else vector(owner, "tension", tension, cables)
-        force, moment = vector(owner, "tip_force", tip_force, 3), vector(owner, "tip_moment", tip_moment, 3)
-        return self._statics.solve(tension, force, moment)
+        loads = {
+            "tip_moment": tip_moment,
+            "tip_force": tip_force,
+            "follower_moment": follower_moment,
+            "follower_force": follower_force,
+        }
+        tip_load = np.concatenate([vector(owner, name, load, 3) for name, load in loads.items()])
+        if lengths is None:
+            given = self.neutral if tension is None else vector(owner, "tension", tension, cables)
+            return self.statics.solve(given, tip_load)
+        if tension is not None:
+            raise ValueError(f"{owner}: both tension and lengths are given, but one follows from the other")
+        return self.statics.solve_lengths(vector(owner, "lengths", lengths, cables), tip_load)
 
     def equilibrium_at(
         self,
         tip: Sequence[float] | np.ndarray,
         tension_bounds: tuple[Any, Any] = (-inf, inf),
-    ) -> Equilibrium:
+    ) -> mechanics.Equilibrium:
         """Static equilibrium with the tip at ``tip`` = (y, z), m, held by the tensions of least norm.
 
         Parameters
@@ -234,11 +349,11 @@ class Rod:
         ValueError
             A shape is wrong, a value is not finite, or the bounds cross.
         """
-        return Holding(self, self._statics, self._bounds(tension_bounds)).at(tip)
+        return mechanics.Holding(self, self.statics, self._bounds(tension_bounds)).at(tip)
 
-    def resting(self, tension_bounds: tuple[Any, Any] = (-inf, inf)) -> Equilibrium:
-        """Static equilibrium under the tensions closest to zero within ``tension_bounds``."""
-        return self.equilibrium(np.clip(np.zeros(len(self.cables)), *self._bounds(tension_bounds)))
+    def resting(self, tension_bounds: tuple[Any, Any] = (-inf, inf)) -> mechanics.Equilibrium:
+        """Static equilibrium under the inputs closest to :attr:`neutral` within ``tension_bounds``."""
+        return self.equilibrium(np.clip(self.neutral, *self._bounds(tension_bounds)))
 
     def step(self, sample_time: float, substep: float | None = None) -> ca.Function:
         """CasADi Function (x, tension, tip_force) -> x one sample later, compiled when there is a C compiler.
@@ -246,7 +361,8 @@ class Rod:
         Parameters
         ----------
         sample_time
-            s; tension (cables,) N and tip_force (3,) N, a dead force in the base frame, are held so long.
+            s; tension (cables,) N and tip_force (3,) N, a dead force in the world frame, are held so long. Free
+            parameters are a last argument p.
         substep
             Longest substep of the integration, s. By default 1/250 of the period of the straight rod's slowest
             mode: accuracy asks for that, stability does not.
@@ -262,34 +378,74 @@ class Rod:
 
     def step_expression(self, sample_time: float, substep: float | None = None) -> ca.Function:
         """:meth:`step` before compilation, to be part of a larger Function or to be differentiated."""
-        if substep is None:
-            unloaded = modes(self, self.stiffness.full(), np.zeros(self.dof))
-            substep = 1 / (_step.SUBSTEPS_PER_PERIOD * float(unloaded.frequency[0]))
-        return _step.w_method(self.model, sample_time, _step.substeps(sample_time, substep))
+        if substep is None and self._free:
+            raise ValueError(
+                "Rod.step: substep is not given, and its default follows from the values of the parameters; give it, s"
+            )
+        return mechanics.w_method(self.model, sample_time, mechanics.substeps(self, sample_time, substep))
 
-    def reference_step(self, sample_time: float) -> ca.Function:
-        """The same map as :meth:`step` by CVODES at a tolerance of 1e-11: slow, to check against."""
-        return _step.reference(self.model, sample_time)
+    def reference_step(
+        self, sample_time: float, method: Literal["cvodes", "collocation"] = "cvodes", elements: int = 10
+    ) -> ca.Function:
+        """The same map as :meth:`step` by CasADi's own integrators: slow, to check against.
 
-    def linearise(self, equilibrium: Equilibrium | None = None, sample_time: float | None = None) -> Linearisation:
-        """A, B, C, D from tensions to the tip (y, z), about ``equilibrium`` (default: at rest with slack cables).
-
-        Continuous time, or with ``sample_time`` (s) discrete time with the tensions held over a sample.
+        "cvodes" is Sundials' multistep method at a tolerance of 1e-11, "collocation" Legendre collocation of degree 4
+        on ``elements`` intervals.
         """
-        return linearise(self, equilibrium or self.equilibrium(), sample_time)
+        if method not in ("cvodes", "collocation"):
+            raise ValueError(f"Rod.reference_step: method is {method!r}, but must be 'cvodes' or 'collocation'")
+        return mechanics.reference(self.model, sample_time, method, elements)
 
-    def modes(self, equilibrium: Equilibrium | None = None) -> Modes:
-        """Undamped frequencies, Hz, and damping ratios about ``equilibrium`` (default: at rest, cables slack)."""
+    def linearise(
+        self,
+        equilibrium: mechanics.Equilibrium | None = None,
+        sample_time: float | None = None,
+        output: ca.Function | None = None,
+    ) -> mechanics.Linearisation:
+        """A, B, C, D about ``equilibrium`` (default: at rest with :attr:`neutral` inputs), which holds the loads too.
+
+        Continuous time, or with ``sample_time`` (s) discrete time with the inputs held over a sample. The output is the
+        tip's (y, z) in the base frame, or a CasADi Function of the state x.
+
+        Examples
+        --------
+        >>> A, B, C, D = Rod.preset("paper").linearise(sample_time=0.05)
+        >>> A.shape, B.shape, C.shape
+        ((16, 16), (16, 3), (2, 16))
+        """
+        return mechanics.linearise(self._valued, equilibrium or self.equilibrium(), sample_time, output)
+
+    def modes(self, equilibrium: mechanics.Equilibrium | None = None) -> mechanics.Modes:
+        """Undamped frequencies, Hz, and damping ratios about ``equilibrium`` (default: as in :meth:`linearise`).
+
+        Examples
+        --------
+        >>> Rod.preset("paper").modes().frequency[:2].round(4).tolist()
+        [0.7365, 0.7365]
+        """
         at = equilibrium or self.equilibrium()
-        return modes(self, self._statics.tangent(at), at.q)
+        return mechanics.modes(self._valued, at.stiffness, at.q)
 
     @cached_property
-    def _statics(self) -> Statics:
-        return Statics(self)
+    def statics(self) -> mechanics.Statics:
+        """Newton's method for this rod's equilibria, behind :meth:`equilibrium`."""
+        return mechanics.Statics(self._valued)
 
     @cached_property
     def _steps(self) -> dict[tuple[float, float | None], ca.Function]:
         return {}
+
+    @property
+    def _free(self) -> bool:
+        return bool(self.parameters) and self.parameter_values is None
+
+    @property
+    def _valued(self) -> Rod:
+        """This rod; ValueError when parameters have no values, which a simulation in numbers needs."""
+        if self._free:
+            names = ", ".join(str(symbol) for symbol in self.parameters)
+            raise ValueError(f"Rod: the parameters {names} have no values; use rod.at([...]) to give them")
+        return self
 
     def _bounds(self, bounds: tuple[Any, Any]) -> tuple[np.ndarray, np.ndarray]:
         try:
@@ -302,5 +458,98 @@ class Rod:
             raise ValueError(f"tension_bounds is {bounds!r}, but no lower bound may be above its upper bound")
         return lower, upper
 
+    def _check_places(self) -> None:
+        """ValueError when something lies beyond the tip."""
+        for name, things in (("payloads", self.payloads), ("loads", self.loads), ("cables", self.cables)):
+            for i, thing in enumerate(things):
+                for what in ("s", "start", "end"):
+                    s = getattr(thing, what, None)
+                    if s is not None and s > self.length * (1 + 1e-9):
+                        raise ValueError(f"Rod: {what} of {name}[{i}] is {s!r} m, beyond the tip at {self.length:g} m")
+
+    def _check_symbols(self) -> None:
+        """ValueError when something is written with a symbol that is not among the parameters."""
+        for symbol in self.parameters:
+            if not symbol.is_symbolic():
+                raise ValueError(f"Rod: parameters holds {symbol}, but must hold CasADi SX symbols")
+        written: list[Any] = [*self.gravity, *self.base_position]
+        for division in self.divisions:
+            written += [*division.inertia_at(0.5), division.stiffness_at(0.5), division.damping_at(0.5)]
+            written += [division.strain.rest_at(ca.SX(0.5))]
+        for payload in self.payloads:
+            written += [payload.mass, *payload.offset, *(value for row in payload.inertia for value in row)]
+        for load in self.loads:
+            written += load.at(load.start) if isinstance(load, DistributedLoad) else (*load.force, *load.moment)
+        for cable in self.cables:
+            written += [*cable.at(cable.start), cable.pull, cable.friction, getattr(cable, "stiffness", None) or 0.0]
+        if self.drag is not None:
+            written += [*self.drag.linear, *self.drag.quadratic, *self.drag.angular]
+        for symbol in ca.symvar(ca.veccat(ca.SX(0, 1), *written)):
+            if not any(ca.is_equal(symbol, parameter) for parameter in self.parameters):
+                raise ValueError(f"Rod: the symbol {symbol} is used but not among parameters; add it there")
+
+    def _warn_of_cables_outside(self) -> None:
+        start = 0.0
+        for division in self.divisions:
+            for i, cable in enumerate(self.cables):
+                end = self.length if cable.end is None else cable.end
+                for x in (0.0, 0.5, 1.0):
+                    s, section = start + x * division.length, division.section_at(x)
+                    y, z = cable.at(s) if cable.start <= s <= end else (0.0, 0.0)
+                    if symbolic((y, z)) or section.contains(float(y), float(z)):
+                        continue
+                    y_half, z_half = (float(half) for half in section.half_widths or (0, 0))
+                    warnings.warn(
+                        f"Rod: cable {i} runs at (y, z) = ({float(y):g}, {float(z):g}) m at s = {s:g} m, outside the "
+                        f"section, which reaches to ({y_half:g}, {z_half:g}) m; that is right only if discs carry it",
+                        stacklevel=4,
+                    )
+                    return
+            start += division.length
+
     def __getstate__(self) -> dict[str, Any]:
         return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+def _divisions(divisions: Sequence[Division] | Division, given: dict[str, Any]) -> tuple[Division, ...]:
+    """The divisions of a rod, from ``divisions`` and what is given in their place or beside them."""
+    several = (divisions,) if isinstance(divisions, Division) else tuple(divisions)
+    for i, division in enumerate(several):
+        if not isinstance(division, Division):
+            raise TypeError(f"Rod: divisions[{i}] is {division!r}, but must be a Division")
+    if several:
+        if "length" in given and len(several) > 1:
+            raise ValueError(
+                f"Rod: length is {given['length']!r} m beside {len(several)} divisions, each of which has its own"
+            )
+        return tuple(replace(division, **given) for division in several)
+    missing = [name for name in ("length", "section", "material", "strain") if name not in given]
+    if missing:
+        raise ValueError(f"Rod: {', '.join(missing)} not given; a rod has them, or divisions that have them")
+    return (Division(**given),)
+
+
+def _all_of(name: str, things: Any, kinds: tuple[type, ...]) -> tuple[Any, ...]:
+    """``things`` as a tuple; TypeError when one is of another kind."""
+    several = (things,) if isinstance(things, kinds) else tuple(things)
+    for i, thing in enumerate(several):
+        if not isinstance(thing, kinds):
+            wanted = " or a ".join(kind.__name__ for kind in kinds)
+            raise TypeError(f"Rod: {name}[{i}] is {thing!r}, but must be a {wanted}")
+    return several
+
+
+def _rotation(value: Any) -> tuple[tuple[float, ...], ...]:
+    try:
+        rotation = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        rotation = np.zeros(0)
+    if rotation.shape != (3, 3) or not _is_rotation(rotation):
+        raise ValueError(
+            f"Rod: base_rotation is {value!r}, but must be a rotation matrix (3, 3): orthonormal, right-handed"
+        )
+    return matrix("Rod", "base_rotation", rotation, 3)
+
+
+def _is_rotation(matrix: np.ndarray) -> bool:
+    return np.allclose(matrix.T @ matrix, np.eye(3), atol=1e-9) and np.linalg.det(matrix) > 0

@@ -25,7 +25,7 @@ def lagrange():
     q, v = ca.SX.sym("q", n), ca.SX.sym("v", n)
     pose = rod.pose.expand()
     nodes, weights = np.polynomial.legendre.leggauss(4)
-    section, rho = rod.section, rod.material.density
+    section, rho = rod.divisions[0].section, rod.divisions[0].material.density
     kinetic, potential = ca.SX(0), ca.SX(0)
     for node, weight in zip((nodes + 1) / 2 * rod.length, weights / 2 * rod.length, strict=True):
         g = pose(q, node)
@@ -49,7 +49,7 @@ def test_mass_and_bias_are_lagranges(lagrange, seed):
     assert np.allclose(ALL_STRAINS.mass(q).full(), mass, rtol=0, atol=1e-12)
 
     # Legendre polynomials are orthogonal: the integral of P_k^2 along the rod is L / (2 k + 1).
-    section, length = ALL_STRAINS.section, ALL_STRAINS.length
+    section, length = ALL_STRAINS.divisions[0].section, ALL_STRAINS.length
     k = np.array([0, 0, 1, 0, 1, 0, 0, 0])
     moments = [section.Ix, section.Iy, section.Iy, section.Iz, section.Iz] + 3 * [section.area]
     elastic = np.array([1e6 / 3, 1e6, 1e6, 1e6, 1e6, 1e6, 1e6 / 3, 1e6 / 3])
@@ -113,7 +113,7 @@ def test_the_step_has_order_two():
 
 
 def test_energy_without_damping_and_gravity_is_conserved_to_the_order_of_the_method():
-    free = replace(PAPER, material=replace(PAPER.material, damping=0.0))
+    free = replace(PAPER, material=replace(PAPER.divisions[0].material, damping=0.0))
     released = free.equilibrium([5.0, -3.0, 0.0]).state
     before = float(free.energy(released))
     drift = []

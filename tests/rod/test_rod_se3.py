@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from socasadi.rod import _se3 as se3
+from socasadi.rod.mechanics import _se3 as se3
 
 ANGLES = [0.0, 1e-9, 1e-4, 0.1, 0.9999, 1.0001, 3.1, 2 * np.pi, 20.0]
 

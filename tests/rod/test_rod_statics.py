@@ -108,7 +108,7 @@ def test_actuation_is_minus_the_derivative_of_the_cable_lengths():
         stations = np.linspace(0, PAPER.length, lines + 1)
         poses = rod.pose.map(lines + 1)(np.tile(q[:, None], lines + 1), stations[None, :]).full()
         poses = poses.reshape(4, lines + 1, 4).transpose(1, 0, 2)
-        offsets = np.array([[0, cable.y, cable.z, 1] for cable in PAPER.cables])
+        offsets = np.array([[0, *cable.route, 1] for cable in PAPER.cables])
         points = (poses @ offsets.T)[:, :3]
         return np.linalg.norm(np.diff(points, axis=0), axis=1).sum(axis=0)
 
@@ -149,7 +149,7 @@ def test_out_of_reach_says_by_how_much():
 
 
 def test_no_equilibrium_is_a_named_error():
-    with pytest.raises(EquilibriumError, match="no equilibrium found for tension"):
+    with pytest.raises(EquilibriumError, match="no equilibrium found under cable inputs"):
         PAPER.equilibrium(tension=[1e5, 1e5, 1e5])
 
 

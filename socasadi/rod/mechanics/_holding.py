@@ -8,15 +8,16 @@ import casadi as ca
 import numpy as np
 from scipy.optimize import least_squares
 
-from ._checks import vector
+from .._checks import vector
+from ._model import TIP_LOADS
 from ._statics import Equilibrium, EquilibriumError, Statics
 
 if TYPE_CHECKING:
-    from ._rod import Rod
+    from .._rod import Rod
 
 _ITERATIONS = 40
 _REACHED = 1e-6  # of the length: a nearest pose that misses by less counts as reached
-_ZERO = np.zeros(3)
+_NO_LOAD = np.zeros(TIP_LOADS)
 
 
 class Holding:
@@ -36,7 +37,9 @@ class Holding:
         target = vector("Rod.equilibrium_at", "tip", tip, 2)
         if not self._rod.cables:
             raise EquilibriumError("a rod without cables cannot hold its tip away from rest; give it cables")
-        rest = self._statics.solve(self._clip(np.zeros(len(self._rod.cables))), _ZERO, _ZERO)
+        if any(cable.drive == "length" for cable in self._rod.cables):
+            raise EquilibriumError("tensions of least norm hold a tip, but this rod has cables driven by their length")
+        rest = self._statics.solve(self._clip(np.zeros(len(self._rod.cables))), _NO_LOAD)
         held = self._least_norm(rest, target)
         if held is None:
             nearest = self._nearest(rest, target)
@@ -52,13 +55,13 @@ class Holding:
 
     def _least_norm(self, latest: Equilibrium, target: np.ndarray) -> Equilibrium | None:
         for _ in range(_ITERATIONS):
-            slope = self._statics.tip_sensitivity(latest)[1:]
-            tension = self._program(slope, slope @ latest.tension + target - latest.tip[1:])
+            slope = self._slope(latest)
+            tension = self._program(slope, slope @ latest.tension + target - self._tip(latest))
             if tension is None:
                 return None
             change = float(np.abs(tension - latest.tension).max())
             try:
-                latest = self._statics.solve(tension, _ZERO, _ZERO, latest.q)
+                latest = self._statics.solve(tension, _NO_LOAD, latest.q)
             except EquilibriumError:
                 return None
             if change < 1e-9 * (1 + float(np.abs(tension).max())):
@@ -88,17 +91,17 @@ class Holding:
         def at(tension: np.ndarray) -> Equilibrium:
             nonlocal latest
             if not np.array_equal(tension, latest.tension):
-                latest = self._statics.solve(tension, _ZERO, _ZERO, latest.q)
+                latest = self._statics.solve(tension, _NO_LOAD, latest.q)
             return latest
 
         def miss(tension: np.ndarray) -> np.ndarray:
             try:
-                return (at(tension).tip[1:] - target) / length
+                return (self._tip(at(tension)) - target) / length
             except EquilibriumError:
                 return np.full(2, 1e3)  # no pose there: a trial that the trust region takes back
 
         def slope(tension: np.ndarray) -> np.ndarray:
-            return self._statics.tip_sensitivity(at(tension))[1:] / length
+            return self._slope(at(tension)) / length
 
         # The trust region keeps strictly inside bounds, so those of a fixed cable are set a hair apart.
         upper = np.maximum(self._upper, self._lower + 1e-9)
@@ -114,14 +117,23 @@ class Holding:
             gtol=1e-14,
         )
         nearest = at(found.x)
-        distance = float(np.linalg.norm(nearest.tip[1:] - target))
+        distance = float(np.linalg.norm(self._tip(nearest) - target))
         if distance > _REACHED * length:
-            y, z = nearest.tip[1:]
+            y, z = self._tip(nearest)
             raise EquilibriumError(
                 f"the tip cannot be held at (y, z) = ({target[0]:g}, {target[1]:g}) m with tensions within the bounds: "
                 f"the nearest static pose has it at ({y:.5f}, {z:.5f}) m, {1e3 * distance:.3g} mm away"
             )
         return nearest
+
+    def _tip(self, equilibrium: Equilibrium) -> np.ndarray:
+        """(y, z) of the tip, m, base frame."""
+        return self._rod.in_base_frame(equilibrium.tip)[1:]
+
+    def _slope(self, equilibrium: Equilibrium) -> np.ndarray:
+        """Derivative (2, cables) of that with respect to the tensions, m/N."""
+        rotation = np.array(self._rod.base_rotation)
+        return (rotation.T @ self._statics.tip_sensitivity(equilibrium))[1:]
 
     def _clip(self, tension: np.ndarray) -> np.ndarray:
         return np.clip(tension, self._lower, self._upper)

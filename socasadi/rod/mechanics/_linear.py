@@ -7,10 +7,11 @@ import casadi as ca
 import numpy as np
 from scipy.linalg import eigh, expm
 
-from ._checks import positive
+from .._checks import positive
+from ._model import TIP_LOADS
 
 if TYPE_CHECKING:
-    from ._rod import Rod
+    from .._rod import Rod
     from ._statics import Equilibrium
 
 
@@ -21,7 +22,8 @@ class Linearisation:
     Attributes
     ----------
     A, B, C, D
-        Matrices (2 n, 2 n), (2 n, cables), (2, 2 n), (2, cables): state [q; v], tensions in N, tip (y, z) in m.
+        Matrices (2 n, 2 n), (2 n, cables), (outputs, 2 n), (outputs, cables): state [q; v]; tensions in N, or the
+        other inputs that cables and chambers take; the tip's (y, z) in m, base frame, unless another output was given.
     sample_time
         s; None for continuous time.
     equilibrium
@@ -59,18 +61,26 @@ class Modes:
     shape: np.ndarray
 
 
-def linearise(rod: Rod, equilibrium: Equilibrium, sample_time: float | None) -> Linearisation:
+def linearise(
+    rod: Rod, equilibrium: Equilibrium, sample_time: float | None, output: ca.Function | None
+) -> Linearisation:
     n, m = rod.dof, len(rod.cables)
-    x, u, tip_force = ca.MX.sym("x", 2 * n), ca.MX.sym("u", m), ca.MX.sym("tip_force", 3)
-    xdot, tip = rod.model.forced_rhs(x, u, tip_force), rod.model.tip(x[:n])
-    jacobians = [ca.jacobian(xdot, x), ca.jacobian(xdot, u), ca.jacobian(tip[1:], x)]
-    evaluate = ca.Function("linear", [x, u, tip_force], jacobians)
-    A, B, C = (value.full() for value in evaluate(equilibrium.state, equilibrium.tension, equilibrium.tip_force))
+    x, u, tip = ca.MX.sym("x", 2 * n), ca.MX.sym("u", m), ca.MX.sym("tip", TIP_LOADS)
+    if output is None:
+        y = (ca.DM(rod.base_rotation).T @ rod.tip(x[:n]))[1:]
+    elif output.n_in() == 1 and output.size_in(0) == (2 * n, 1):
+        y = output(x)
+    else:
+        raise ValueError(f"Rod.linearise: output is {output}, but must be a CasADi Function of the state x ({2 * n},)")
+    xdot = rod.model.loaded_rhs(x, u, tip)
+    jacobians = [ca.jacobian(xdot, x), ca.jacobian(xdot, u), ca.jacobian(y, x)]
+    evaluate = ca.Function("linear", [x, u, tip], jacobians)
+    A, B, C = (value.full() for value in evaluate(equilibrium.state, equilibrium.input, equilibrium.tip_load))
     if sample_time is not None:
         positive("Rod.linearise", sample_time=sample_time)
         both = expm(sample_time * np.block([[A, B], [np.zeros((m, 2 * n + m))]]))
         A, B = both[: 2 * n, : 2 * n], both[: 2 * n, 2 * n :]
-    return Linearisation(A, B, C, np.zeros((2, m)), sample_time, equilibrium)
+    return Linearisation(A, B, C, np.zeros((C.shape[0], m)), sample_time, equilibrium)
 
 
 def modes(rod: Rod, tangent: np.ndarray, q: np.ndarray) -> Modes:

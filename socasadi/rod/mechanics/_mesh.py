@@ -1,0 +1,216 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+
+from .._checks import Number
+from .._quadrature import gauss_legendre
+from ..body import DistributedLoad, Payload, PointLoad
+from ._kernels import GAUSS_POINTS
+
+if TYPE_CHECKING:
+    from .._rod import Rod
+    from ..body import Cable, Chamber
+
+_SAME_PLACE = 1e-12  # of the length
+_CABLE_TOLERANCE = 1e-10
+_MOST_CABLE_POINTS = 64
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A stretch of the rod, from ``a`` to ``b`` m, within which strain and loads are smooth."""
+
+    division: int
+    a: float
+    b: float
+    points: int
+
+    @property
+    def length(self) -> float:
+        return self.b - self.a
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A place that the recursion along the rod stops at, and the interval of length ``h`` m that leads there.
+
+    ``x`` is its place ``s`` as a fraction of its division. ``weight`` is the quadrature weight, m, zero where the node
+    is only the end of a piece or carries a load. Basis and rest strain are those at the interval's two Gauss points.
+    """
+
+    division: int
+    s: float
+    x: float
+    h: float
+    weight: float
+    bases: tuple[ca.DM, ca.DM]
+    rests: tuple[ca.SX, ca.SX]
+    payloads: tuple[Payload, ...]
+    point_loads: tuple[PointLoad, ...]
+
+
+@dataclass(frozen=True)
+class CableSpan:
+    """The stretch from ``a`` to ``b`` m of a cable within one piece, with its quadrature (arc length, weight), m."""
+
+    division: int
+    a: float
+    b: float
+    nodes: tuple[tuple[float, float], ...]
+
+
+class Mesh:
+    """Where along the rod the equations are evaluated: Gauss points of each piece, ends of pieces, and loads."""
+
+    def __init__(self, rod: Rod) -> None:
+        self._rod = rod
+        ends = np.cumsum([division.length for division in rod.divisions])
+        self.spans = list(pairwise([0.0, *ends.tolist()]))
+        """Where each division begins and ends, m."""
+        ends = np.cumsum([0, *(division.dof for division in rod.divisions)]).tolist()
+        self.coordinates = [slice(a, b) for a, b in pairwise(ends)]
+        """Which of the rod's coordinates are each division's own."""
+
+    @cached_property
+    def pieces(self) -> list[Piece]:
+        rod = self._rod
+        cuts = [edge for load in rod.loads if isinstance(load, DistributedLoad) for edge in (load.start, load.end)]
+        pieces = []
+        for index, ((start, end), division) in enumerate(zip(self.spans, rod.divisions, strict=True)):
+            breaks = [start + x * division.length for x in division.strain.breaks]
+            inner = [s for s in (*breaks, *cuts) if s is not None and start < s < end]
+            for a, b in pairwise(self._distinct([start, *inner, end])):
+                pieces.append(Piece(index, a, b, division.points_in((b - a) / division.length)))
+        return pieces
+
+    @cached_property
+    def nodes(self) -> list[Node]:
+        rod = self._rod
+        nodes: list[Node] = []
+        carried = [body.s for body in (*rod.payloads, *rod.loads) if not isinstance(body, DistributedLoad)]
+        marks = [rod.length if s is None else s for s in carried]
+        for piece in self.pieces:
+            x, w = gauss_legendre(piece.points)
+            stops = [(s, weight) for s, weight in zip(piece.a + piece.length * x, piece.length * w, strict=True)]
+            stops += [(s, 0.0) for s in (*marks, piece.b) if piece.a < s <= piece.b]
+            start = piece.a
+            for s in self._distinct([s for s, _ in stops]):
+                weight = sum(w for place, w in stops if self._same(place, s))
+                nodes.append(self._node(piece, start, s, float(weight)))
+                start = s
+        return nodes
+
+    def spans_of(self, cable: Cable | Chamber) -> tuple[CableSpan, ...]:
+        """A cable's way through the pieces of the rod.
+
+        As many points in each piece as the cable's length and its derivatives take to converge.
+        """
+        end = self._rod.length if cable.end is None else cable.end
+        spans = []
+        for piece in self.pieces:
+            a, b = max(piece.a, cable.start), min(piece.b, end)
+            if a < b and not self._same(a, b):
+                spans.append(CableSpan(piece.division, a, b, _converged(cable, a, b, piece.points)))
+        return tuple(spans)
+
+    def local(self, division: int, s: float) -> float:
+        """Arc length ``s`` as the fraction x of its division."""
+        start, end = self.spans[division]
+        return (s - start) / (end - start)
+
+    def _node(self, piece: Piece, start: float, stop: float, weight: float) -> Node:
+        rod, h = self._rod, stop - start
+        strain = rod.divisions[piece.division].strain
+        x = [self.local(piece.division, start + c * h) for c in GAUSS_POINTS]
+        a, b = (ca.DM(strain.sparsity, values) for values in strain.tabulate(np.array(x)))
+        here = [
+            body
+            for body in (*rod.payloads, *rod.loads)
+            if not isinstance(body, DistributedLoad) and self._same(rod.length if body.s is None else body.s, stop)
+        ]
+        return Node(
+            piece.division,
+            stop,
+            self.local(piece.division, stop),
+            h,
+            weight,
+            (a, b),
+            (strain.rest_at(ca.SX(x[0])), strain.rest_at(ca.SX(x[1]))),
+            tuple(body for body in here if isinstance(body, Payload)),
+            tuple(body for body in here if isinstance(body, PointLoad)),
+        )
+
+    def _same(self, s: float, other: float) -> bool:
+        return abs(s - other) <= _SAME_PLACE * self._rod.length
+
+    def _distinct(self, places: list[float]) -> list[float]:
+        """``places`` in order, those that rounding alone tells apart taken as one."""
+        ordered = sorted(float(s) for s in places)
+        return ordered[:1] + [b for a, b in pairwise(ordered) if not self._same(a, b)]
+
+
+def route_at(cable: Cable | Chamber, s: float) -> list[ca.SX]:
+    """Offset (3,) of the cable in the section at ``s``, its first and its second derivative with respect to s."""
+    place, derivatives = _route(cable)
+    return ca.substitute(derivatives, [place], [ca.SX(s)])
+
+
+def _route(cable: Cable | Chamber) -> tuple[ca.SX, list[ca.SX]]:
+    place = ca.SX.sym("s")
+    offset = ca.SX(ca.vertcat(0, *cable.at(place)))
+    slope = ca.jacobian(offset, place)
+    return place, [ca.densify(value) for value in (offset, slope, ca.jacobian(slope, place))]
+
+
+def loads_at(rod: Rod, node: Node) -> tuple[list[Number], list[Number]]:
+    """Dead and follower wrench (6,) each, moment first, that act at a node, gravity of the slice around it included."""
+    dead: list[Number] = [0.0] * 6
+    follower: list[Number] = [0.0] * 6
+    wrenches: list[tuple[bool, tuple[Number, ...]]] = []
+    for load in node.point_loads:
+        wrenches.append((load.follower, (*load.moment, *load.force)))
+    for load in rod.loads:
+        if node.weight and isinstance(load, DistributedLoad) and load.start < node.s < (load.end or rod.length):
+            wrenches.append((load.follower, tuple(node.weight * value for value in load.at(node.s))))
+    if node.weight:
+        mass = node.weight * inertia_at(rod, node)[3]
+        wrenches.append((False, (0.0, 0.0, 0.0, *(mass * g for g in rod.gravity))))
+    for follows, wrench in wrenches:
+        total = follower if follows else dead
+        total[:] = [a + b for a, b in zip(total, wrench, strict=True)]
+    return dead, follower
+
+
+def inertia_at(rod: Rod, node: Node) -> list[Number]:
+    """Diagonal (6,) of the section's mass matrix per metre at a node."""
+    return rod.divisions[node.division].inertia_at(node.x)
+
+
+def _converged(cable: Cable | Chamber, a: float, b: float, points: int) -> tuple[tuple[float, float], ...]:
+    """Gauss points and weights between ``a`` and ``b`` that integrate the cable's length and moments to rounding."""
+    place, (offset, slope, _) = _route(cable)
+    along = ca.vertcat(1 + slope[0], slope[1], slope[2])
+    speed = ca.norm_2(along)
+    symbols = ca.vertcat(ca.SX(0, 1), *(s for s in ca.symvar(offset) if not ca.is_equal(s, place)))
+    integrand = ca.Function("integrand", [place, symbols], [ca.vertcat(speed, ca.cross(offset, along / speed))])
+
+    def integrate(count: int) -> tuple[np.ndarray, list[tuple[float, float]]]:
+        x, w = gauss_legendre(count)
+        nodes = list(zip((a + (b - a) * x).tolist(), ((b - a) * w).tolist(), strict=True))
+        # A route's symbols have no values yet; at one they show its shape.
+        return sum(w * integrand(s, ca.DM.ones(symbols.shape)).full()[:, 0] for s, w in nodes), nodes  # type: ignore[return-value]
+
+    value, nodes = integrate(points)
+    while points < _MOST_CABLE_POINTS:
+        points = min(2 * points, _MOST_CABLE_POINTS)
+        finer, more = integrate(points)
+        if np.abs(finer - value).max() <= _CABLE_TOLERANCE * (1 + np.abs(finer).max()):
+            break
+        value, nodes = finer, more
+    return tuple(nodes)
