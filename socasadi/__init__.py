@@ -31,11 +31,12 @@ name                        symbol       meaning, unit
 from .campaign import Circle, Cost, Origin, Pulse, Result, Study, Task
 from .model import Dense, Modal
 from .mpc import LinearMPC
-from .plant import LaserSpot, Plant, SimulatedPlant
+from .plant import Camera, LaserSpot, Plant, SimulatedPlant
 from .rod import Rod
 from .tune import Optimizer
 
 __all__ = [
+    "Camera",
     "Circle",
     "Cost",
     "Dense",

@@ -32,10 +32,10 @@ def c_compiler() -> list[str] | None:
 def compiled(function: ca.Function, *, flags: Sequence[str] = ()) -> ca.Function:
     """The same Function as machine code.
 
-    The C that CasADi generates for ``function`` is compiled to a shared library, which is kept in
-    :func:`cache_directory` under a hash of the C text, the compiler and the flags: a second call, in this process
-    or another, only loads it. Without a C compiler ``function`` itself is returned, and a warning says so once
-    for the process.
+    The C that CasADi generates for ``function`` is compiled, for this machine's own processor, to a shared library,
+    which is kept in :func:`cache_directory` under a hash of the C text, the compiler, the processor and the flags: a
+    second call, in this process or another, only loads it. Without a C compiler ``function`` itself is returned, and
+    a warning says so once for the process.
 
     Parameters
     ----------
@@ -54,13 +54,14 @@ def compiled(function: ca.Function, *, flags: Sequence[str] = ()) -> ca.Function
         _warn_interpreted()
         return function
     source = _c_source(function)
-    parts = (source, *compiler, _compiler_version(compiler[0]), platform.machine(), *_FLAGS, *flags)
+    native, target = _target(tuple(compiler))
+    parts = (source, *compiler, target, *_FLAGS, *native, *flags)
     digest = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
     name = f"{function.name()}-{digest}.so"
 
     def build(folder: Path) -> None:
         (folder / "function.c").write_text(source)
-        command = [*compiler, *_FLAGS, "function.c", "-o", name, *flags, "-lm"]
+        command = [*compiler, *_FLAGS, *native, "function.c", "-o", name, *flags, "-lm"]
         run = subprocess.run(command, cwd=folder, capture_output=True, text=True)
         if run.returncode:
             raise CompilationError(
@@ -77,8 +78,16 @@ def _c_source(function: ca.Function) -> str:
 
 
 @functools.cache
-def _compiler_version(path: str) -> str:
-    return subprocess.run([path, "--version"], capture_output=True, text=True).stdout
+def _target(compiler: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
+    """Flags that let the compiler use all of this processor, and a text that tells both from others.
+
+    The macros that a compiler defines for ``-march=native`` name its version and each extension of the processor.
+    """
+    for flags in (("-march=native",), ()):
+        run = subprocess.run([*compiler, *flags, "-dM", "-E", "-x", "c", os.devnull], capture_output=True, text=True)
+        if run.returncode == 0:
+            return flags, run.stdout
+    return (), platform.platform()
 
 
 def _advice() -> str:

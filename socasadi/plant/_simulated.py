@@ -25,9 +25,9 @@ class SimulatedPlant:
     sample_time
         s; tensions are held so long.
     noise
-        Standard deviation of the sensor's white Gaussian noise, in the output's unit (m).
+        Standard deviation of the sensor's white Gaussian noise, in the output's unit (m; pixels for a camera).
     output
-        What is measured: :class:`TipDisplacement` or :class:`LaserSpot`.
+        What is measured: :class:`TipDisplacement`, :class:`LaserSpot` or :class:`Camera`.
 
     Raises
     ------
@@ -47,7 +47,7 @@ class SimulatedPlant:
                 raise ValueError(f"SimulatedPlant: {name} is {value!r}, but must be finite and not negative")
         if sample_time == 0:
             raise ValueError("SimulatedPlant: sample_time is 0 s, but must be above zero")
-        output.check(rod)
+        output.check(rod.valued)
         self.rod = rod
         self.sample_time = float(sample_time)
         self.noise = float(noise)
@@ -61,7 +61,7 @@ class SimulatedPlant:
 
     @property
     def inputs(self) -> int:
-        """Number of tensions."""
+        """Number of tensions (pressures, lengths: what the rod's cables and chambers take)."""
         return len(self.rod.cables)
 
     @property
@@ -71,7 +71,7 @@ class SimulatedPlant:
 
     @property
     def tension(self) -> np.ndarray:
-        """The tensions held now (inputs,), N."""
+        """The inputs held now (inputs,), N unless the rod's cables and chambers take something else."""
         return self._tension.copy()
 
     @property
@@ -97,8 +97,8 @@ class SimulatedPlant:
         return self._samples * self.sample_time
 
     def shape(self, n: int = 50) -> np.ndarray:
-        """Positions (n, 3), m, of ``n`` points evenly spaced along the rod now."""
-        return self.rod.centreline(self._running()[: self.rod.dof], n)
+        """Positions (n, 3), m, of ``n`` points evenly spaced along the rod now, base frame."""
+        return self.rod.in_base_frame(self.rod.centreline(self._running()[: self.rod.dof], n))
 
     def prepare(self) -> None:
         """Build and compile what a step needs, which the first step would do otherwise.
@@ -144,7 +144,7 @@ class SimulatedPlant:
         )
         self._random = np.random.default_rng(seed)
         self._samples = 0
-        self._tension = pose.tension.copy()
+        self._tension = pose.input.copy()
         return self._settle(pose.state, *(value.full()[:, 0] for value in self._observe(pose.state)))
 
     def step(self, tension: ArrayLike, tip_force: ArrayLike | None = None) -> np.ndarray:
@@ -175,7 +175,7 @@ class SimulatedPlant:
         state = self._running()
         applied = _finite("tension", tension, self.inputs, "N")
         force = _NO_FORCE if tip_force is None else _finite("tip_force", tip_force, 3, "N")
-        advanced = self._advance(state, applied, force)
+        advanced = self._advance(state, applied, np.array(self.rod.base_rotation) @ force)
         self._tension = applied
         self._samples += 1
         return self._settle(*advanced)
@@ -204,7 +204,7 @@ class SimulatedPlant:
     def _observe(self) -> ca.Function:
         """x -> (tip position, output)"""
         x = ca.MX.sym("x", 2 * self.rod.dof)
-        pose = self.rod.pose(x[: self.rod.dof], self.rod.length)
+        pose = ca.DM(np.linalg.inv(self.rod.base_pose)) @ self.rod.pose(x[: self.rod.dof], self.rod.length)
         return ca.Function("observe", [x], [pose[:3, 3], self.output.measure(pose)])
 
     @cached_property

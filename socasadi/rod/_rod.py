@@ -247,12 +247,12 @@ class Rod:
     @property
     def stiffness(self) -> ca.DM:
         """Elastic stiffness matrix (n, n), constant."""
-        return self._valued.model.stiffness  # type: ignore[return-value]
+        return self.valued.model.stiffness  # type: ignore[return-value]
 
     @property
     def damping_matrix(self) -> ca.DM:
         """Viscous damping matrix (n, n), constant."""
-        return self._valued.model.damping_matrix  # type: ignore[return-value]
+        return self.valued.model.damping_matrix  # type: ignore[return-value]
 
     @property
     def neutral(self) -> np.ndarray:
@@ -263,6 +263,21 @@ class Rod:
         """The rod with ``values`` for its :attr:`parameters`, in their order: a rod of numbers, ready to simulate."""
         return replace(self, parameter_values=values)  # type: ignore[arg-type]
 
+    @property
+    def base_pose(self) -> np.ndarray:
+        """Homogeneous pose (4, 4) of the base in the world."""
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = self.base_rotation, self.base_position
+        return pose
+
+    @property
+    def valued(self) -> Rod:
+        """This rod; ValueError when parameters have no values, which a simulation in numbers needs."""
+        if self._free:
+            names = ", ".join(str(symbol) for symbol in self.parameters)
+            raise ValueError(f"Rod: the parameters {names} have no values; use rod.at([...]) to give them")
+        return self
+
     def in_base_frame(self, points: np.ndarray) -> np.ndarray:
         """Points (..., 3) of the world, m, as the base sees them."""
         return (points - np.array(self.base_position)) @ np.array(self.base_rotation)
@@ -270,7 +285,7 @@ class Rod:
     def centreline(self, q: Sequence[float] | np.ndarray, n: int = 50) -> np.ndarray:
         """Positions (n, 3), m, of ``n`` points evenly spaced along the rod at coordinates ``q``, world frame."""
         q = vector("Rod.centreline", "q", q, self.dof)
-        poses = self._valued.pose.map(n)(ca.repmat(ca.DM(q), 1, n), ca.DM(np.linspace(0, self.length, n)).T).full()
+        poses = self.valued.pose.map(n)(ca.repmat(ca.DM(q), 1, n), ca.DM(np.linspace(0, self.length, n)).T).full()
         return poses[:3, 3::4].T
 
     def equilibrium(
@@ -413,7 +428,7 @@ class Rod:
         >>> A.shape, B.shape, C.shape
         ((16, 16), (16, 3), (2, 16))
         """
-        return mechanics.linearise(self._valued, equilibrium or self.equilibrium(), sample_time, output)
+        return mechanics.linearise(self.valued, equilibrium or self.equilibrium(), sample_time, output)
 
     def modes(self, equilibrium: mechanics.Equilibrium | None = None) -> mechanics.Modes:
         """Undamped frequencies, Hz, and damping ratios about ``equilibrium`` (default: as in :meth:`linearise`).
@@ -424,12 +439,12 @@ class Rod:
         [0.7365, 0.7365]
         """
         at = equilibrium or self.equilibrium()
-        return mechanics.modes(self._valued, at.stiffness, at.q)
+        return mechanics.modes(self.valued, at.stiffness, at.q)
 
     @cached_property
     def statics(self) -> mechanics.Statics:
         """Newton's method for this rod's equilibria, behind :meth:`equilibrium`."""
-        return mechanics.Statics(self._valued)
+        return mechanics.Statics(self.valued)
 
     @cached_property
     def _steps(self) -> dict[tuple[float, float | None], ca.Function]:
@@ -438,14 +453,6 @@ class Rod:
     @property
     def _free(self) -> bool:
         return bool(self.parameters) and self.parameter_values is None
-
-    @property
-    def _valued(self) -> Rod:
-        """This rod; ValueError when parameters have no values, which a simulation in numbers needs."""
-        if self._free:
-            names = ", ".join(str(symbol) for symbol in self.parameters)
-            raise ValueError(f"Rod: the parameters {names} have no values; use rod.at([...]) to give them")
-        return self
 
     def _bounds(self, bounds: tuple[Any, Any]) -> tuple[np.ndarray, np.ndarray]:
         try:

@@ -61,10 +61,8 @@ def test_the_same_function_is_compiled_once(monkeypatch, empty_cache):
     commands = []
     run = subprocess.run
     monkeypatch.setattr(internals.subprocess, "run", lambda command, **k: commands.append(command) or run(command, **k))
-    internals._compiler_version.cache_clear()
     compiled(wave())
     assert sum("function.c" in command for command in commands) == 1
-    internals._compiler_version.cache_clear()
     again = compiled(wave())
     assert sum("function.c" in command for command in commands) == 1
     assert float(again([0.5, 0])[0]) == pytest.approx(sin(0.5), rel=1e-14)
@@ -81,6 +79,14 @@ def test_functions_of_one_name_are_told_apart_by_content():
 def test_flags_are_part_of_what_is_cached(empty_cache):
     compiled(wave())
     compiled(wave(), flags=["-DANYTHING=1"])
+    assert len(list(empty_cache.iterdir())) == 2
+
+
+@needs_compiler
+def test_a_library_made_for_another_processor_is_not_loaded(monkeypatch, empty_cache):
+    compiled(wave())
+    monkeypatch.setattr(internals, "_target", lambda compiler: ((), "#define __VERSION__ of another machine"))
+    assert float(compiled(wave())([0.5, 0])[0]) == pytest.approx(sin(0.5), rel=1e-14)
     assert len(list(empty_cache.iterdir())) == 2
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from socasadi.plant import LaserSpot, Plant, PlantFailure, SimulatedPlant
-from socasadi.rod import EquilibriumError, Rod
+from socasadi.plant import Camera, LaserSpot, Plant, PlantFailure, SimulatedPlant
+from socasadi.rod import Cable, Chamber, EquilibriumError, Rod
 
 ROD = Rod.preset("paper")
 
@@ -157,6 +157,10 @@ def test_bad_tension_moves_nothing(exact, tension, message):
         (lambda: SimulatedPlant(ROD, noise=-1), "noise is -1"),
         (lambda: SimulatedPlant(ROD, output=LaserSpot(0.5)), "screen is at distance 0.5 m"),
         (lambda: LaserSpot(np.inf), "distance is inf"),
+        (lambda: Camera((1, 0), (0, 0, 0), 500), r"position is \(1, 0\)"),
+        (lambda: Camera((1, 0, 0), (0, 0, 0), -5), "focal_length is -5 pixels"),
+        (lambda: Camera((1, 0, 0), (1, 0, 0), 500), "must give a line of sight"),
+        (lambda: Camera((1, 0, 0), (0, 0, 0), 500, up=(1, 0, 0)), "a direction that is not along it"),
         (lambda: SimulatedPlant(ROD).reset(tip=(0, 0), tension_bounds=(1, -1)), r"tension_bounds is \(1, -1\)"),
         (lambda: SimulatedPlant(ROD).reset(tip=(0, np.nan)), "tip is .* finite"),
     ],
@@ -209,3 +213,47 @@ def test_a_running_plant_can_be_sent_to_another_process(plant):
     twin = pickle.loads(pickle.dumps(plant))
     for _ in range(3):
         assert np.array_equal(twin.step([1.0, 2.0, 3.0]), plant.step([1.0, 2.0, 3.0]))
+
+
+def test_a_camera_sees_the_tip_by_similar_triangles():
+    """At 1 m and a focal length of 500 a displacement of 1 mm is half a pixel; left and up are negative."""
+    camera = SimulatedPlant(ROD, noise=0.0, output=Camera((1.6, 0, 0), (0.6, 0, 0), focal_length=500))
+    assert np.allclose(camera.reset(), 0, atol=1e-12)
+    pixels = camera.reset(tip=(0.02, 0.03))
+    depth = 1.6 - camera.tip[0]
+    # Looking against +x with +z upright, +y is to the right.
+    assert np.allclose(pixels, 500 * np.array([0.02, -0.03]) / depth, rtol=1e-7)
+
+
+def test_a_tip_behind_the_camera_is_not_seen():
+    behind = SimulatedPlant(ROD, noise=0.0, output=Camera((0.5, 0, 0), (0.0, 0, 0), focal_length=500))
+    with pytest.raises(PlantFailure, match="Camera sees nothing"):
+        behind.reset()
+
+
+def test_what_a_plant_shows_does_not_depend_on_where_its_base_stands():
+    """Turn base, gravity and disturbance together: the same experiment, seen from the base."""
+    turn = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    gravity = np.array([9.81, 0.0, 0.0])
+    here = SimulatedPlant(replace(ROD, gravity=gravity), noise=0.0)
+    there = replace(ROD, gravity=turn @ gravity, base_rotation=turn, base_position=(1.0, 2.0, 3.0))
+    there = SimulatedPlant(there, noise=0.0)
+    assert np.allclose(there.reset(tip=(0.01, 0.02)), here.reset(tip=(0.01, 0.02)), atol=1e-12)
+    for _ in range(5):
+        assert np.allclose(there.step([5, -3, 0], [0, 0.1, 0.2]), here.step([5, -3, 0], [0, 0.1, 0.2]), atol=1e-10)
+    assert np.allclose(there.tip, here.tip, atol=1e-10)
+    assert np.allclose(there.shape(5), here.shape(5), atol=1e-10)
+
+
+def test_chambers_and_cables_of_given_length_drive_a_plant():
+    chambers = tuple(Chamber(cable.route, area=1e-4) for cable in ROD.cables)
+    pushed = SimulatedPlant(replace(ROD, cables=chambers), noise=0.0)
+    pulled = SimulatedPlant(ROD, noise=0.0)
+    pushed.reset()
+    pulled.reset()
+    assert np.allclose(pushed.step([5e4, 0, 0]), pulled.step([-5, 0, 0]), atol=1e-12)
+    wires = tuple(Cable(cable.route, drive="length", stiffness=5e4) for cable in ROD.cables)
+    servo = SimulatedPlant(replace(ROD, cables=wires), noise=0.0)
+    assert np.allclose(servo.reset(), 0)
+    assert np.allclose(servo.tension, 0.6)
+    assert hold(servo, [0.59, 0.6, 0.6], 1.0)[0] > 0.05
