@@ -1,68 +1,178 @@
-"""How one sample of the rod is best integrated: the package's W-method against CasADi's own linearly implicit method.
+"""How fast the rod is: beside Exudyn, PyElastica and SoRoMoX, by degrees of freedom, and until it is machine code.
 
-    python studies/speed_rod.py
+    pip install socasadi[peers]
+    python studies/speed_rod.py [--no-peers]
 
-For the preset "paper" after a step of 5 N on one cable: error of the tip at 1 s against CVODES at a tolerance of 1e-11,
-wall time of one compiled sample of 50 ms, and how long code generation and the C compiler took together (from an
-empty cache). CasADi's method takes the compiler the better part of a minute.
+The step couple (studies/peers/case.py) in three kinds of model. Each run has a process of its own on one core; the
+time is the best of a few repetitions. The error is the largest distance of the tip, of the forty samples up to 2 s, to
+the converged answer of the same model by the same program (SoRoMoX: to that of this package, which solves the same
+equations).
 """
 
+import argparse
 import os
 import tempfile
 import time
-from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
-import casadi as ca
+import matplotlib.pyplot as plt
 import numpy as np
+from peers import Absent, Run, exudyn, measured, pyelastica, soromox
+from peers.case import COUPLE, DENSITY, DURATION, LENGTH, RADIUS, SAMPLE, TIMES, VISCOSITY, YOUNG
 
-from socasadi import Rod
 from socasadi.codegen import Buffered, compiled
+from socasadi.rod import Material, PointLoad, Rod, Section, Strain
 
-SAMPLE, TENSION, NO_FORCE = 0.05, np.array([5.0, 0.0, 0.0]), np.zeros(3)
+WHOLE, NO_SHEAR, PLANE = "whole, 3-D", "neither torsion nor shear, 3-D", "plane"
+CONVERGED = {
+    WHOLE: {"strain": {"bending_z": 7, "stretch": 4, "shear_y": 5}, "points": 14, "step": 5e-4},
+    NO_SHEAR: {"strain": {"bending_z": 7, "stretch": 4}, "points": 14, "step": 5e-4},
+}
+CONVERGED[PLANE] = CONVERGED[WHOLE]
+SIX = {"bending_y": 2, "bending_z": 2, "torsion": 0, "stretch": 0, "shear_y": 0, "shear_z": 0}
+OURS: list[tuple[str, dict[str, Any]]] = [
+    (WHOLE, {"strain": SIX, "points": 10, "step": 0.025}),
+    (WHOLE, {"strain": SIX, "points": 4, "step": 0.025}),
+    (NO_SHEAR, {"strain": {"bending_y": 2, "bending_z": 2, "stretch": 0}, "points": 4, "step": 0.025}),
+    (PLANE, {"strain": {"bending_z": 2, "stretch": 0, "shear_y": 0}, "points": 4, "step": 0.025}),
+]
+PEERS: list[tuple[str, Any, dict[str, Any], dict[str, Any] | None]] = [
+    (WHOLE, exudyn, {"beam": "spatial", "elements": 12, "step": SAMPLE / 3}, {"elements": 64, "step": SAMPLE / 50}),
+    (WHOLE, pyelastica, {"elements": 20, "step": SAMPLE / 80}, {"elements": 80, "step": SAMPLE / 500}),
+    (WHOLE, soromox, {"orders": (0, 2, 2, 0, 0, 0), "solver": "Kvaerno5", "step": 0.01, "rtol": 1e-4}, None),
+    (NO_SHEAR, exudyn, {"beam": "cable", "elements": 2, "step": 0.025}, {"elements": 16, "step": SAMPLE / 50}),
+    (NO_SHEAR, soromox, {"orders": (-1, 2, 2, 0, -1, -1), "step": 1e-3}, None),
+    (PLANE, exudyn, {"beam": "planar", "elements": 2, "step": 0.025}, {"elements": 16, "step": SAMPLE / 50}),
+]
+
+
+def rod(strain: dict[str, int], points: int, **changes: Any) -> Rod:
+    material = Material(YOUNG, poisson=0.5, density=DENSITY, damping=VISCOSITY)
+    return Rod(LENGTH, Section.circle(RADIUS), material, Strain(**strain), quadrature_points=points, **changes)
+
+
+def ours(strain: dict[str, int], points: int, step: float) -> Run:
+    """The step couple by this package: one call of machine code for all the samples."""
+    begin = time.perf_counter()
+    bent = rod(strain, points, loads=(PointLoad(moment=(0, 0, COUPLE)),))
+    every_sample = compiled(bent.step_expression(SAMPLE, step).mapaccum(len(TIMES)))
+    call, rest = Buffered(every_sample), np.zeros(2 * bent.dof)
+    nothing = np.zeros(3 * len(TIMES))
+    call(rest, np.zeros(0), nothing)
+    setup, walls, states = time.perf_counter() - begin, [], rest
+    for _ in range(50):
+        begin = time.perf_counter()
+        (states,) = call(rest, np.zeros(0), nothing)
+        walls.append(time.perf_counter() - begin)
+    states = states.reshape(len(TIMES), -1)
+    tip = np.array([bent.tip(x[: bent.dof]).full()[:, 0] for x in states])
+    name = f"socasadi, {', '.join(strain)}, {points} points, {1e3 * step:.3g} ms"
+    return Run(name, len(strain) > 3 or "bending_y" in strain, bent.dof, TIMES, tip, min(walls), setup)
+
+
+def beside_peers(with_peers: bool) -> None:
+    print(f"{'':82} {'dof':>4} {'error / mm':>10} {'x real time':>11} {'setup / s':>9} {'MB':>5}")
+    answers = {kind: measured(ours, **settings) for kind, settings in CONVERGED.items() if kind != PLANE}
+    answers[PLANE] = answers[WHOLE]
+    fastest: dict[str, list[float]] = {}
+    for kind, settings in OURS:
+        run = measured(ours, **settings)
+        show(kind, run, answers[kind])
+        if isinstance(run, Run):
+            fastest.setdefault(kind, []).append(run.wall)
+    for kind, peer, settings, finest in PEERS if with_peers else []:
+        run = measured(peer, **settings)
+        show(kind, run, measured(peer, **settings | finest) if finest else answers[kind])
+        if isinstance(run, Run):
+            print(f"{'':82} {run.wall / min(fastest[kind]):.1f} times the time of socasadi's fastest of this kind")
+
+
+def show(kind: str, run: Run | Absent, converged: Run | Absent) -> None:
+    if isinstance(run, Absent) or isinstance(converged, Absent):
+        absent = run if isinstance(run, Absent) else converged
+        print(f"{absent.name}: {absent.reason}")  # type: ignore[union-attr]
+        return
+    error = 1e3 * np.linalg.norm(run.tip - converged.tip, axis=1).max()
+    print(
+        f"{f'{run.name} ({kind})':82} {run.dof:4} {error:10.3f} {DURATION / run.wall:11.0f} {run.setup:9.2f} "
+        f"{run.memory:5.0f}",
+        flush=True,
+    )
+
+
+def legendre(dof: int) -> dict[str, int]:
+    """Bending about both axes as far as ``dof`` goes, with constant torsion and stretch."""
+    half = (dof - 2) // 2
+    return {"bending_y": half - 1, "bending_z": half - 1, "torsion": 0, "stretch": 0}
+
+
+def right_hand_side(dof: int, points: int) -> float:
+    """Wall time of one compiled right-hand side, s."""
+    function = compiled(rod(legendre(dof), points).rhs)
+    call, random = Buffered(function), np.random.default_rng(0)
+    call(0.1 * random.normal(size=2 * dof), np.zeros(0))
+    best = np.inf
+    for _ in range(20):
+        begin = time.perf_counter()
+        for _ in range(200):
+            call._evaluate()
+        best = min(best, (time.perf_counter() - begin) / 200)
+    return best
+
+
+def growth(folder: Path) -> None:
+    dofs, counts = (4, 6, 8, 10, 14, 20, 28, 40), (4, 6, 10, 16, 24, 40)
+    by_dof = [1e6 * right_hand_side(dof, max(10, dof // 2)) for dof in dofs]
+    at_ten = [1e6 * right_hand_side(dof, 20) for dof in dofs]
+    by_points = [1e6 * right_hand_side(10, points) for points in counts]
+    print("\nright-hand side, us:")
+    print(f"  10 coordinates, 10 points: {by_points[2]:.2f}")
+    print("  20 points, by coordinates:", ", ".join(f"{n}: {t:.1f}" for n, t in zip(dofs, at_ten, strict=True)))
+    print("  10 coordinates, by points:", ", ".join(f"{n}: {t:.1f}" for n, t in zip(counts, by_points, strict=True)))
+    slope = [np.polyfit(np.log(x[-4:]), np.log(y[-4:]), 1)[0] for x, y in ((dofs, at_ten), (counts, by_points))]
+    print(f"  power over the upper half: {slope[0]:.2f} in coordinates, {slope[1]:.2f} in points")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True, layout="constrained")
+    left.loglog(dofs, at_ten, "o-", label="20 points")
+    left.loglog(dofs, by_dof, "s--", label="points as coordinates ask for: max(10, n / 2)")
+    left.loglog(dofs[3:], [at_ten[3] * (n / dofs[3]) ** 2 for n in dofs[3:]], ":", color="0.5", label="square")
+    left.set(xlabel="coordinates n", ylabel="one right-hand side / µs", xticks=dofs, xticklabels=dofs)
+    right.loglog(counts, by_points, "o-", label="10 coordinates")
+    right.loglog(counts, [by_points[2] * n / counts[2] for n in counts], ":", color="0.5", label="proportional")
+    right.set(xlabel="quadrature points", xticks=counts, xticklabels=counts)
+    for axes in (left, right):
+        axes.minorticks_off()
+        axes.grid(alpha=0.3)
+        axes.legend(frameon=False, fontsize=8)
+    figure.savefig(folder / "rod-growth.png", dpi=150)
+
+
+def build(dof: int, points: int) -> Run:
+    """From a description to a compiled step, in a process of its own; the tip and its times stay empty."""
+    begin = time.perf_counter()
+    rod(legendre(dof), points).step(SAMPLE, 0.005)
+    setup = time.perf_counter() - begin
+    return Run("", True, dof, np.empty(0), np.empty(0), np.nan, setup)
+
+
+def building() -> None:
+    print("\nfrom Rod(...) to a compiled step, s (peak memory of the process without the compiler's, MB):")
+    for dof, points in ((10, 10), (24, 16), (40, 24)):
+        with tempfile.TemporaryDirectory() as cache:
+            os.environ["SOCASADI_CACHE"] = cache
+            cold, cached = measured(build, dof=dof, points=points), measured(build, dof=dof, points=points)
+        if isinstance(cold, Run) and isinstance(cached, Run):
+            print(f"  {dof} coordinates: {cold.setup:.2f} cold ({cold.memory:.0f}), {cached.setup:.2f} from the cache")
 
 
 def main() -> None:
-    rod = Rod.preset("paper")
-    methods: dict[str, Callable[[], ca.Function]] = {
-        f"W-method, substeps of {1e3 * substep:g} ms": lambda substep=substep: rod.step_expression(SAMPLE, substep)
-        for substep in (0.01, 0.005, 0.0025)
-    }
-    methods["rosenbrock, one step of 50 ms"] = lambda: rosenbrock(rod, steps=1)
-    wanted = tip_after_a_second(rod, rod.reference_step(SAMPLE))
-    print(f"{'':32} {'tip error / um':>15} {'sample / us':>12} {'compiled in / s':>16}")
+    parser = argparse.ArgumentParser(description="How fast the rod is.")
+    parser.add_argument("--no-peers", action="store_true", help="leave out Exudyn, PyElastica and SoRoMoX")
+    beside_peers(not parser.parse_args().no_peers)
     with tempfile.TemporaryDirectory() as cache:
         os.environ["SOCASADI_CACHE"] = cache
-        for name, make in methods.items():
-            start = time.perf_counter()
-            step = compiled(make())
-            built = time.perf_counter() - start
-            error = 1e6 * np.linalg.norm(tip_after_a_second(rod, step) - wanted)
-            print(f"{name:32} {error:15.3f} {1e6 * sample_time(rod, step):12.1f} {built:16.1f}", flush=True)
-
-
-def rosenbrock(rod: Rod, steps: int) -> ca.Function:
-    x, u, force = ca.MX.sym("x", 2 * rod.dof), ca.MX.sym("u", len(rod.cables)), ca.MX.sym("force", 3)
-    ode = {"x": x, "p": ca.vertcat(u, force), "ode": rod.forced_rhs(x, u, force)}
-    options = {"step_size": SAMPLE / steps}
-    integrator = ca.integrator("sample", "rosenbrock", ode, 0.0, SAMPLE, options)
-    return ca.Function("rosenbrock", [x, u, force], [integrator(x0=x, p=ca.vertcat(u, force))["xf"]])
-
-
-def tip_after_a_second(rod: Rod, step: ca.Function) -> np.ndarray:
-    x = np.zeros(2 * rod.dof)
-    for _ in range(round(1 / SAMPLE)):
-        x = step(x, TENSION, NO_FORCE).full()[:, 0]
-    return rod.tip(x[: rod.dof]).full()[:, 0]
-
-
-def sample_time(rod: Rod, step: ca.Function, repetitions: int = 2000) -> float:
-    """Median wall time of a sample, s."""
-    call, x, spent = Buffered(step), np.zeros(2 * rod.dof), []
-    for _ in range(repetitions):
-        start = time.perf_counter()
-        (x,) = call(x, TENSION, NO_FORCE)
-        spent.append(time.perf_counter() - start)
-    return float(np.median(spent))
+        growth(Path(__file__).parent / "figures")
+    building()
 
 
 if __name__ == "__main__":

@@ -3,19 +3,21 @@
 import dataclasses
 import importlib
 import inspect
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 
 class ForeignTypeError(ValueError):
-    """A description holds an object of a class that a study script defines."""
+    """A description holds an object that only a study script can make: of its own class, or a function."""
 
 
 def describe(value: Any) -> Any:
     """``value`` as JSON data: numbers, text, lists, and for an object its type with what it was constructed from.
 
-    An object is a dataclass, or one whose constructor arguments are attributes of the same names.
+    An object is a dataclass, or one whose constructor arguments are attributes of the same names. A function is told
+    from others by its source, a symbolic expression by its text.
     """
     match value:
         case None | bool() | int() | float() | str():
@@ -26,6 +28,10 @@ def describe(value: Any) -> Any:
             return [describe(item) for item in value]
         case dict():
             return {str(key): describe(item) for key, item in value.items()}
+    if inspect.isroutine(value):
+        return {"type": _public_name(value), "source": _source(value)}
+    if type(value).__str__ is not object.__str__:
+        return {"type": _public_name(type(value)), "source": str(value)}
     if dataclasses.is_dataclass(value):
         names = [field.name for field in dataclasses.fields(value) if field.init]
     else:
@@ -65,8 +71,16 @@ def differences(old: Any, new: Any, path: str = "") -> list[str]:
     return [] if old == new else [f"{path} was {old} and is {new}"]
 
 
-def _public_name(kind: type) -> str:
-    """Where a user would import a type from: the first package above its private module."""
+def _source(function: Callable[..., Any]) -> str:
+    try:
+        return inspect.getsource(function).strip()
+    except (OSError, TypeError):  # typed at a prompt, or not written in Python
+        code = getattr(function, "__code__", None)
+        return f"{code.co_code.hex()} {code.co_consts}" if code else function.__qualname__
+
+
+def _public_name(kind: type | Callable[..., Any]) -> str:
+    """Where a user would import a type or a function from: the first package above its private module."""
     # A study script is a module without a name of its own, whether Python or the command runs it.
     parts = [part for part in kind.__module__.split(".") if not part.startswith("_")] or ["script"]
     return ".".join([*parts, kind.__qualname__])

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -11,8 +10,8 @@ import casadi as ca
 import numpy as np
 
 from ..codegen import compiled
-from . import mechanics
-from ._checks import matrix, numbers, symbolic, vector
+from . import _validation, mechanics
+from ._checks import numbers, vector
 from .body import (
     Cable,
     Chamber,
@@ -138,13 +137,13 @@ class Rod:
             if value is not None
         }
         put = object.__setattr__
-        put(self, "divisions", _divisions(divisions, given))
-        put(self, "cables", _all_of("cables", cables, (Cable, Chamber)))
+        put(self, "divisions", _validation.one_or_several(divisions, given))
+        put(self, "cables", _validation.all_of("cables", cables, (Cable, Chamber)))
         put(self, "gravity", numbers("Rod", "gravity", gravity, 3))
-        put(self, "base_rotation", _rotation(base_rotation))
+        put(self, "base_rotation", _validation.rotation(base_rotation))
         put(self, "base_position", numbers("Rod", "base_position", base_position, 3))
-        put(self, "payloads", _all_of("payloads", payloads, (Payload,)))
-        put(self, "loads", _all_of("loads", loads, (PointLoad, DistributedLoad)))
+        put(self, "payloads", _validation.all_of("payloads", payloads, (Payload,)))
+        put(self, "loads", _validation.all_of("loads", loads, (PointLoad, DistributedLoad)))
         put(self, "drag", drag)
         symbols = [parameters] if isinstance(parameters, ca.SX) else list(parameters)
         put(self, "parameters", tuple(symbol for column in symbols for symbol in ca.vertsplit(ca.vec(column))))
@@ -154,9 +153,9 @@ class Rod:
             put(self, "parameter_values", tuple(values.tolist()))
         if drag is not None and not isinstance(drag, Drag):
             raise TypeError(f"Rod: drag is {drag!r}, but must be a Drag or None")
-        self._check_places()
-        self._check_symbols()
-        self._warn_of_cables_outside()
+        _validation.check_places(self)
+        _validation.check_symbols(self)
+        _validation.warn_of_cables_outside(self)
 
     @classmethod
     def preset(cls, name: str) -> Rod:
@@ -299,6 +298,9 @@ class Rod:
         lengths: Sequence[float] | np.ndarray | None = None,
     ) -> mechanics.Equilibrium:
         """Static equilibrium under constant loads, reached by increasing them together from zero.
+
+        A rod that buckles on the way follows the branch that an imperfection (a small side load, a rest curvature)
+        points to. Without any it may stay on the straight one: the equilibrium's ``stability`` tells.
 
         Parameters
         ----------
@@ -465,98 +467,5 @@ class Rod:
             raise ValueError(f"tension_bounds is {bounds!r}, but no lower bound may be above its upper bound")
         return lower, upper
 
-    def _check_places(self) -> None:
-        """ValueError when something lies beyond the tip."""
-        for name, things in (("payloads", self.payloads), ("loads", self.loads), ("cables", self.cables)):
-            for i, thing in enumerate(things):
-                for what in ("s", "start", "end"):
-                    s = getattr(thing, what, None)
-                    if s is not None and s > self.length * (1 + 1e-9):
-                        raise ValueError(f"Rod: {what} of {name}[{i}] is {s!r} m, beyond the tip at {self.length:g} m")
-
-    def _check_symbols(self) -> None:
-        """ValueError when something is written with a symbol that is not among the parameters."""
-        for symbol in self.parameters:
-            if not symbol.is_symbolic():
-                raise ValueError(f"Rod: parameters holds {symbol}, but must hold CasADi SX symbols")
-        written: list[Any] = [*self.gravity, *self.base_position]
-        for division in self.divisions:
-            written += [*division.inertia_at(0.5), division.stiffness_at(0.5), division.damping_at(0.5)]
-            written += [division.strain.rest_at(ca.SX(0.5))]
-        for payload in self.payloads:
-            written += [payload.mass, *payload.offset, *(value for row in payload.inertia for value in row)]
-        for load in self.loads:
-            written += load.at(load.start) if isinstance(load, DistributedLoad) else (*load.force, *load.moment)
-        for cable in self.cables:
-            written += [*cable.at(cable.start), cable.pull, cable.friction, getattr(cable, "stiffness", None) or 0.0]
-        if self.drag is not None:
-            written += [*self.drag.linear, *self.drag.quadratic, *self.drag.angular]
-        for symbol in ca.symvar(ca.veccat(ca.SX(0, 1), *written)):
-            if not any(ca.is_equal(symbol, parameter) for parameter in self.parameters):
-                raise ValueError(f"Rod: the symbol {symbol} is used but not among parameters; add it there")
-
-    def _warn_of_cables_outside(self) -> None:
-        start = 0.0
-        for division in self.divisions:
-            for i, cable in enumerate(self.cables):
-                end = self.length if cable.end is None else cable.end
-                for x in (0.0, 0.5, 1.0):
-                    s, section = start + x * division.length, division.section_at(x)
-                    y, z = cable.at(s) if cable.start <= s <= end else (0.0, 0.0)
-                    if symbolic((y, z)) or section.contains(float(y), float(z)):
-                        continue
-                    y_half, z_half = (float(half) for half in section.half_widths or (0, 0))
-                    warnings.warn(
-                        f"Rod: cable {i} runs at (y, z) = ({float(y):g}, {float(z):g}) m at s = {s:g} m, outside the "
-                        f"section, which reaches to ({y_half:g}, {z_half:g}) m; that is right only if discs carry it",
-                        stacklevel=4,
-                    )
-                    return
-            start += division.length
-
     def __getstate__(self) -> dict[str, Any]:
         return {f.name: getattr(self, f.name) for f in fields(self)}
-
-
-def _divisions(divisions: Sequence[Division] | Division, given: dict[str, Any]) -> tuple[Division, ...]:
-    """The divisions of a rod, from ``divisions`` and what is given in their place or beside them."""
-    several = (divisions,) if isinstance(divisions, Division) else tuple(divisions)
-    for i, division in enumerate(several):
-        if not isinstance(division, Division):
-            raise TypeError(f"Rod: divisions[{i}] is {division!r}, but must be a Division")
-    if several:
-        if "length" in given and len(several) > 1:
-            raise ValueError(
-                f"Rod: length is {given['length']!r} m beside {len(several)} divisions, each of which has its own"
-            )
-        return tuple(replace(division, **given) for division in several)
-    missing = [name for name in ("length", "section", "material", "strain") if name not in given]
-    if missing:
-        raise ValueError(f"Rod: {', '.join(missing)} not given; a rod has them, or divisions that have them")
-    return (Division(**given),)
-
-
-def _all_of(name: str, things: Any, kinds: tuple[type, ...]) -> tuple[Any, ...]:
-    """``things`` as a tuple; TypeError when one is of another kind."""
-    several = (things,) if isinstance(things, kinds) else tuple(things)
-    for i, thing in enumerate(several):
-        if not isinstance(thing, kinds):
-            wanted = " or a ".join(kind.__name__ for kind in kinds)
-            raise TypeError(f"Rod: {name}[{i}] is {thing!r}, but must be a {wanted}")
-    return several
-
-
-def _rotation(value: Any) -> tuple[tuple[float, ...], ...]:
-    try:
-        rotation = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        rotation = np.zeros(0)
-    if rotation.shape != (3, 3) or not _is_rotation(rotation):
-        raise ValueError(
-            f"Rod: base_rotation is {value!r}, but must be a rotation matrix (3, 3): orthonormal, right-handed"
-        )
-    return matrix("Rod", "base_rotation", rotation, 3)
-
-
-def _is_rotation(matrix: np.ndarray) -> bool:
-    return np.allclose(matrix.T @ matrix, np.eye(3), atol=1e-9) and np.linalg.det(matrix) > 0

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from .._rod import Rod
 
 _ITERATIONS = 25
-_SMALLEST_LOAD_STEP = 1 / 256
+_SMALLEST_LOAD_STEP = 1 / 512
+_LOOKED_AT = 33  # places along the rod whose stretch is looked at
 _LARGEST_TURN = 0.7  # rad of section rotation that one Newton step may add before it is shortened
 
 
@@ -121,6 +122,8 @@ class Statics:
 
         self._tip = ca.Function("tip", [q], [p, R, ca.vertcat(R @ J[:3, :], R @ J[3:, :])])
         self._spin = spin_gram(rod.divisions)
+        places = np.linspace(0, rod.length, _LOOKED_AT)
+        self._stretch = ca.Function("stretch", [q], [ca.mmin(ca.vertcat(*(model.strain(q, s)[3] for s in places)))])
 
     @property
     def neutral(self) -> np.ndarray:
@@ -163,21 +166,30 @@ class Statics:
         residual, tangent = (value.full() for value in newton(y, *loads, 0.0))
         pull = newton(y, *loads, 1.0)[0].full() - residual
         linear = np.linalg.lstsq(tangent, -pull[:, 0], rcond=None)[0]
-        step = 1 / max(1, ceil(self._turn(linear) / 2))
+        step, stable = 1 / max(1, ceil(self._turn(linear) / 2)), True
         while done < 1:
             target = min(1.0, done + step)
             reached = self._converge(newton, y, loads, target)
-            if reached is not None:
-                y, done, step = reached, target, 1.5 * step
-            elif step > _SMALLEST_LOAD_STEP:
+            # Where a rod may buckle, a long step would end on the branch that it leaves.
+            left_branch = stable and reached is not None and not self._stable(newton, reached, loads, target)
+            if (reached is None or left_branch) and step > _SMALLEST_LOAD_STEP:
                 step /= 2
+            elif reached is not None:
+                y, done, step, stable = reached, target, 1.5 * step, stable and not left_branch
             else:
                 raise EquilibriumError(self._failure(loads, done))
         return y
 
+    def _stable(self, newton: ca.Function, y: np.ndarray, loads: tuple[np.ndarray, ...], fraction: float) -> bool:
+        """Whether a small push meets resistance there (cables held at their lengths are not looked into)."""
+        if newton is self._held:
+            return True
+        tangent = newton(y, *loads, fraction)[1].full()
+        return bool(np.linalg.eigvalsh((tangent + tangent.T) / 2)[0] > 0)
+
     def _failure(self, loads: tuple[np.ndarray, ...], done: float) -> str:
         given, tip = (np.round(load, 9).tolist() for load in loads)
-        parts = [f"cable inputs {given}"] if given else []
+        parts = [f"cable inputs {given}"] if any(given) else []
         names = ("tip moment", "tip force", "follower moment", "follower force")
         parts += [f"{name} {tip[3 * i : 3 * i + 3]}" for i, name in enumerate(names) if any(tip[3 * i : 3 * i + 3])]
         parts += [f"gravity {list(self._rod.gravity)} m/s^2"] if any(self._rod.gravity) else []
@@ -203,7 +215,8 @@ class Statics:
             y = y + change * min(1.0, _LARGEST_TURN / max(self._turn(change), 1e-300))
             size = np.linalg.norm(change) / (1 + np.linalg.norm(y))
             if size < 1e-9 and (size < 1e-14 or size >= previous / 2):
-                return y
+                # The linear law goes on where the rod is turned inside out, but no rod does.
+                return y if float(self._stretch(y[: self._rod.dof])) > 0 else None
             previous = size
         return None
 

@@ -8,15 +8,16 @@ The method is the two-stage W-method ROS2 (Verwer, Spee, Blom, Hundsdorfer, SIAM
 
 of order two for any matrix A, and L-stable when A is the Jacobian of f. With
 
-    A = [[0, 1], [-M(q)^-1 K, -M(q)^-1 D]]
+    A = [[0, 1], [-M(q)^-1 K(q), -M(q)^-1 D(q)]]
 
-(K, D the constant elastic and viscous matrices, M the mass matrix at the beginning of the substep, which the first
-stage has at hand) A holds all that is stiff in a rod, and eliminating the first block leaves one symmetric system
-with M + gamma h D + (gamma h)^2 K per stage: no Jacobian, no iteration.
+(M the mass matrix at the beginning of the substep, which the first stage has at hand; K the constant elastic matrix and
+what taut cables of given length add, D the constant viscous one and what drag adds) A holds all that is stiff in a rod,
+and eliminating the first block leaves one symmetric system with M + gamma h D + (gamma h)^2 K per stage: no Jacobian,
+no iteration.
 
 Why not CasADi's own linearly implicit integrator: for the preset "paper" (8 coordinates) after a step of 5 N,
-studies/speed_rod.py gave, on one core of a small server, for the tip error at 1 s and the time of one compiled sample
-of 50 ms:
+studies/speed_integrators.py gave, on one core of a small server, for the tip error at 1 s and the time of one compiled
+sample of 50 ms:
 
     this method, substeps of 10 / 5 / 2.5 ms      7.2 / 1.8 / 0.45 um     37 / 72 / 148 us       1 s to compile
     "rosenbrock", one step of 50 ms               1.4 um                  346 us                 42 s to compile
