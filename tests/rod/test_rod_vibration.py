@@ -5,24 +5,49 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from rod_support import slender
+from scipy.linalg import expm
+from scipy.optimize import brentq
 
-from socasadi.rod import Rod, Strain
+from socasadi.rod import Division, Material, Payload, Rod, Section, Strain
 
 PAPER = Rod.preset("paper")
 TIMOSHENKO = (0.7331, 4.4448, 11.863)  # Hz, no shear correction, with rotary inertia
+EULER_BERNOULLI = (0.7373, 4.6207, 12.938)  # Hz
 E, G, RHO, L, R = 1e6, 1e6 / 3, 1000.0, 0.6, 0.03
+A, I = pi * R**2, pi * R**4 / 4  # noqa: E741
 
 
-def bending_only(order: int, shear: int | None) -> np.ndarray:
+def timoshenko(guess: float, shear_correction: float = 1.0) -> float:
+    """Hz, near ``guess``: roots of the frequency determinant of Timoshenko's beam, clamped and free."""
+
+    def determinant(frequency):
+        square = (2 * pi * frequency) ** 2
+        slope = np.zeros((4, 4))  # of deflection, rotation, moment, shear force
+        slope[0, 1], slope[0, 3], slope[1, 2] = 1, 1 / (shear_correction * G * A), 1 / (E * I)
+        slope[2, 1], slope[2, 3], slope[3, 0] = -RHO * I * square, -1, -RHO * A * square
+        return np.linalg.det(expm(L * slope)[2:, 2:])
+
+    return brentq(determinant, 0.99 * guess, 1.01 * guess, xtol=1e-12)
+
+
+def bending(order: int, shear: int | None, section: Section | None = None) -> np.ndarray:
     strain = Strain(bending_z=order, shear_y=shear)
-    return replace(PAPER, strain=strain, quadrature_points=20).modes().frequency
+    return replace(PAPER, strain=strain, section=section or PAPER.divisions[0].section, quadrature_points=20).modes().frequency
 
 
 def test_bending_converges_to_timoshenko_as_order_and_shear_are_added():
-    errors = [abs(bending_only(order, shear)[0] - TIMOSHENKO[0]) for order, shear in [(1, None), (2, 0), (4, 4)]]
-    assert errors[0] > 5 * errors[1] > 25 * errors[2]
-    assert np.allclose(bending_only(7, 7)[:3], TIMOSHENKO, rtol=1e-4)
+    exact = [timoshenko(guess) for guess in TIMOSHENKO]
+    assert np.allclose(exact, TIMOSHENKO, rtol=1e-4)
+    errors = [abs(bending(order, shear)[0] - exact[0]) for order, shear in [(1, None), (2, 0), (3, 1), (4, 2)]]
+    assert all(coarse > 5 * fine for coarse, fine in zip(errors[:-1], errors[1:], strict=True))
+    assert np.allclose(bending(7, 7)[:3], exact, rtol=2e-5)
+
+
+def test_a_shear_correction_softens_as_timoshenko_has_it():
+    section = replace(Section.circle(R), shear_correction=0.5)
+    exact = timoshenko(timoshenko(0.7331) * 0.994, 0.5)
+    assert bending(6, 6, section)[0] == pytest.approx(exact, rel=1e-5)
 
 
 def test_a_long_rod_without_shear_is_an_euler_bernoulli_beam():
@@ -30,13 +55,15 @@ def test_a_long_rod_without_shear_is_an_euler_bernoulli_beam():
     unit = sqrt(E * R**2 / (4 * RHO)) / (2 * pi * 60.0**2)
     expected = unit * np.array([1.875104, 4.694091, 7.854757]) ** 2
     assert np.allclose(long.modes().frequency[:3], expected, rtol=1e-4)
+    assert np.allclose(1e4 * long.modes().frequency[:3], EULER_BERNOULLI, rtol=1e-4)
 
 
 def test_torsion_and_axial_waves():
-    strain = Strain(torsion=4, stretch=4)
-    frequency = replace(PAPER, strain=strain, quadrature_points=8).modes().frequency
-    assert frequency[0] == pytest.approx(sqrt(G / RHO) / (4 * L), rel=1e-5)  # 7.607 Hz
-    assert frequency[1] == pytest.approx(sqrt(E / RHO) / (4 * L), rel=1e-5)  # 13.176 Hz
+    strain = Strain(torsion=6, stretch=6)
+    frequency = replace(PAPER, strain=strain, quadrature_points=12).modes().frequency
+    torsion, axial = sqrt(G / RHO) / (4 * L), sqrt(E / RHO) / (4 * L)
+    assert np.allclose([torsion, axial], [7.607, 13.176], rtol=1e-4)
+    assert np.allclose(frequency[:3], [torsion, axial, 3 * torsion], rtol=2e-5)
 
 
 def test_the_preset_has_the_first_bending_frequency_within_one_percent_and_two_modes_an_axis():
@@ -47,31 +74,45 @@ def test_the_preset_has_the_first_bending_frequency_within_one_percent_and_two_m
     assert np.allclose(modes.damping_ratio[:4], 3 * 1.1e4 / 1e6 * pi * modes.frequency[:4], rtol=1e-12)
 
 
-def test_linearisation_has_the_modes_as_eigenvalues_and_the_static_gain():
-    A, B, C, D = PAPER.linearise()
+def test_mode_shapes_have_unit_modal_mass_and_diagonalise_the_stiffness():
     modes = PAPER.modes()
-    eigenvalues = np.linalg.eigvals(A)
-    slow = np.sort(np.abs(eigenvalues[np.abs(eigenvalues.imag) > 1]))[0]
-    assert slow == pytest.approx(2 * pi * modes.frequency[0], rel=1e-9)
-    gain = D - C @ np.linalg.solve(A, B)
-    h = 1e-3
-    numeric = np.array([(PAPER.equilibrium(h * e).tip[1:] - PAPER.equilibrium(-h * e).tip[1:]) for e in np.eye(3)])
-    assert np.allclose(gain, numeric.T / (2 * h), rtol=0, atol=1e-9)
+    mass, stiffness = PAPER.mass(np.zeros(8)).full(), PAPER.stiffness.full()
+    assert np.allclose(modes.shape.T @ mass @ modes.shape, np.eye(8), rtol=0, atol=1e-9)
+    squares = (2 * pi * modes.frequency) ** 2
+    assert np.allclose(modes.shape.T @ stiffness @ modes.shape / squares, np.eye(8), rtol=0, atol=1e-9)
 
 
-def test_discrete_linearisation_holds_the_input_over_a_sample():
-    equilibrium = PAPER.equilibrium([4.0, -1.0, 0.0])
-    A, B, *_ = PAPER.linearise(equilibrium)
-    Ad, Bd, *_ = PAPER.linearise(equilibrium, sample_time=0.05)
-    x0, u = np.random.default_rng(0).normal(size=2 * PAPER.dof), np.array([1.0, -2.0, 0.5])
-    end = solve_ivp(lambda _, x: A @ x + B @ u, (0, 0.05), x0, method="Radau", rtol=1e-9, atol=1e-11).y[:, -1]
-    assert np.allclose(Ad @ x0 + Bd @ u, end, rtol=0, atol=1e-6)
+def test_a_tip_mass_on_a_light_beam():
+    """sqrt(3 EI / (m L^3)); with rotary inertia J the two frequencies of the beam's tip compliance."""
+    light = Section(1e-9, 1e-9, 1e-9)
+    division = Division(1.0, light, Material(1.0, 0.5, 1.0), Strain(bending_z=1), stiffness=(1, 1, 1, 1, 1, 1))
+    beam = Rod(divisions=division, payloads=(Payload(2.0),))
+    assert 2 * pi * beam.modes().frequency[0] == pytest.approx(sqrt(3 / 2), rel=1e-6)
+    heavy = replace(beam, payloads=(Payload(2.0, inertia=(0, 0, 0.5)),))
+    compliance = np.array([[1 / 3, 1 / 2], [1 / 2, 1]])
+    squares = 1 / np.sort(np.linalg.eigvals(compliance @ np.diag([2.0, 0.5])))[::-1]
+    assert np.allclose(2 * pi * heavy.modes().frequency[:2], np.sqrt(squares), rtol=1e-6)
+    # The same body with its centre of mass a = 0.4 beyond the tip.
+    beyond = replace(beam, payloads=(Payload(2.0, inertia=(0, 0, 0.5), offset=(0.4, 0, 0)),))
+    mass = np.array([[2.0, 2.0 * 0.4], [2.0 * 0.4, 0.5 + 2.0 * 0.4**2]])
+    squares = 1 / np.sort(np.linalg.eigvals(compliance @ mass))[::-1]
+    assert np.allclose(2 * pi * beyond.modes().frequency[:2], np.sqrt(squares), rtol=1e-6)
 
 
-def test_linearisation_predicts_small_motions_of_the_rod():
-    equilibrium = PAPER.equilibrium([4.0, -1.0, 0.0])
-    Ad, Bd, *_ = PAPER.linearise(equilibrium, sample_time=0.05)
-    random, h = np.random.default_rng(1), 1e-5
-    dx, du = h * random.normal(size=2 * PAPER.dof), h * random.normal(size=3)
-    end = PAPER.reference_step(0.05)(equilibrium.state + dx, equilibrium.tension + du, np.zeros(3)).full()[:, 0]
-    assert np.allclose(end - equilibrium.state, Ad @ dx + Bd @ du, rtol=0, atol=1e-3 * h)
+def test_a_bob_on_a_soft_hinge_is_a_pendulum():
+    """A heavy bob on a stiff, light rod with a soft hinge-like first millimetre swings with sqrt(g / length)."""
+    light, straight = Section(1e-9, 1e-9, 1e-9), Strain(bending_z=0)
+    soft = Division(0.001, light, Material(1.0, 0.5, 1.0), straight, stiffness=[1, 1, 1e-6, 1, 1, 1])
+    stiff = replace(soft, length=0.999, stiffness=[1, 1, 1e6, 1, 1, 1])
+    pendulum = Rod(divisions=(soft, stiff), gravity=(9.81, 0, 0), payloads=(Payload(2.0),))
+    # Turned by t, the soft division of length h has its end at (h sin(t) / t, h t / 2) and resists with EI t / h: the bob
+    # rises by (1 - h + h / 3) t^2 / 2 and moves by (1 - h / 2) t.
+    square = (9.81 * (1 - 2 * 0.001 / 3) + 1e-6 / 0.001 / 2.0) / (1 - 0.001 / 2) ** 2
+    assert 2 * pi * pendulum.modes().frequency[0] == pytest.approx(sqrt(square), rel=1e-8)
+
+
+def test_an_unstable_mode_has_frequency_zero():
+    upright = slender(Strain(bending_z=4), gravity=(-8.5e-6, 0, 0), quadrature_points=12)
+    frequency = upright.modes().frequency
+    assert frequency[0] == 0
+    assert frequency[1] > 0

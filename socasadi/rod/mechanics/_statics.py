@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from .._rod import Rod
 
 _ITERATIONS = 25
-_SMALLEST_LOAD_STEP = 1 / 512
+_SMALLEST_LOAD_STEP = 1 / 8192
+_LARGEST_STEP = 0.3  # rad of section rotation that one load step may add: longer ones lose the branch at a bifurcation
 _LOOKED_AT = 33  # places along the rod whose stretch is looked at
 _LARGEST_TURN = 0.7  # rad of section rotation that one Newton step may add before it is shortened
 
@@ -166,18 +167,19 @@ class Statics:
         residual, tangent = (value.full() for value in newton(y, *loads, 0.0))
         pull = newton(y, *loads, 1.0)[0].full() - residual
         linear = np.linalg.lstsq(tangent, -pull[:, 0], rcond=None)[0]
-        step, stable = 1 / max(1, ceil(self._turn(linear) / 2)), True
+        step, stable = 1 / max(1, ceil(self._turn(linear) / _LARGEST_STEP)), True
         while done < 1:
             target = min(1.0, done + step)
             reached = self._converge(newton, y, loads, target)
-            # Where a rod may buckle, a long step would end on the branch that it leaves.
-            left_branch = stable and reached is not None and not self._stable(newton, reached, loads, target)
-            if (reached is None or left_branch) and step > _SMALLEST_LOAD_STEP:
-                step /= 2
-            elif reached is not None:
-                y, done, step, stable = reached, target, 1.5 * step, stable and not left_branch
-            else:
+            if reached is not None:
+                still_stable = stable and self._stable(newton, reached, loads, target)
+                followed = still_stable == stable and self._turn(reached - y) <= _LARGEST_STEP
+                if followed or step <= _SMALLEST_LOAD_STEP:
+                    y, done, step, stable = reached, target, 1.5 * step, still_stable
+                    continue
+            if step <= _SMALLEST_LOAD_STEP:
                 raise EquilibriumError(self._failure(loads, done))
+            step /= 2
         return y
 
     def _stable(self, newton: ca.Function, y: np.ndarray, loads: tuple[np.ndarray, ...], fraction: float) -> bool:
