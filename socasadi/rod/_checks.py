@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from math import isfinite
+from numbers import Integral
 from typing import Any, SupportsFloat, TypeAlias
 
 import casadi as ca
@@ -24,10 +25,11 @@ def not_negative(owner: str, **values: Any) -> None:
     _demand(owner, values, lambda value: value >= 0, "a finite number, zero or above")
 
 
-def whole(owner: str, name: str, value: Any, least: int) -> None:
-    """ValueError unless ``value`` is a whole number, ``least`` or above."""
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+def whole(owner: str, name: str, value: Any, least: int) -> int:
+    """``value`` as an int; ValueError unless it is a whole number, ``least`` or above."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
         raise ValueError(f"{owner}: {name} is {value!r}, but must be a whole number, {least} or above")
+    return int(value)
 
 
 def symbolic(value: Any) -> bool:

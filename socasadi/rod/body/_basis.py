@@ -51,7 +51,7 @@ class Legendre:
     order: int
 
     def __post_init__(self) -> None:
-        whole("Legendre", "order", self.order, 0)
+        object.__setattr__(self, "order", whole("Legendre", "order", self.order, 0))
 
     @property
     def size(self) -> int:
@@ -104,14 +104,14 @@ class BSpline:
     pieces: int | tuple[float, ...]
 
     def __post_init__(self) -> None:
-        whole("BSpline", "degree", self.degree, 0)
+        object.__setattr__(self, "degree", whole("BSpline", "degree", self.degree, 0))
         if isinstance(self.pieces, Sequence | np.ndarray):
             inner = tuple(float(knot) for knot in self.pieces)
             if not all(a < b for a, b in zip((0.0, *inner), (*inner, 1.0), strict=True)):
                 raise ValueError(f"BSpline: the inner knots are {inner}, but must increase between 0 and 1")
         else:
-            whole("BSpline", "pieces", self.pieces, 1)
-            inner = tuple(k / self.pieces for k in range(1, self.pieces))
+            count = whole("BSpline", "pieces", self.pieces, 1)
+            inner = tuple(k / count for k in range(1, count))
         object.__setattr__(self, "pieces", inner)
 
     @property
@@ -176,7 +176,7 @@ class UserBasis:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "functions", tuple(self.functions))
-        whole("UserBasis", "degree", self.degree, 0)
+        object.__setattr__(self, "degree", whole("UserBasis", "degree", self.degree, 0))
         breaks = tuple(float(x) for x in self.breaks)
         if not all(a < b for a, b in zip((0.0, *breaks), (*breaks, 1.0), strict=True)):
             raise ValueError(f"UserBasis: breaks is {breaks}, but must increase between 0 and 1")

@@ -87,7 +87,8 @@ class Division:
             if given is not None and not callable(given):
                 object.__setattr__(self, name, matrix("Division", name, given, 6))
         if self.quadrature_points is not None:
-            whole("Division", "quadrature_points", self.quadrature_points, 1)
+            points = whole("Division", "quadrature_points", self.quadrature_points, 1)
+            object.__setattr__(self, "quadrature_points", points)
         self._check_rank()
 
     @property

@@ -3,6 +3,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral
 from typing import Any
 
 import casadi as ca
@@ -60,8 +61,8 @@ class Strain:
             basis = getattr(self, name)
             if isinstance(basis, Legendre):  # one way to say it, so that equal strains compare equal
                 object.__setattr__(self, name, basis.order)
-            elif isinstance(basis, int) and not isinstance(basis, bool) and basis >= 0:
-                continue
+            elif isinstance(basis, Integral) and not isinstance(basis, bool) and basis >= 0:
+                object.__setattr__(self, name, int(basis))
             elif basis is not None and not all(hasattr(basis, part) for part in ("size", "degree", "breaks", "values")):
                 raise ValueError(
                     f"Strain: {name} is {basis!r}, but must be None, a polynomial order 0, 1, 2, ... or a basis"

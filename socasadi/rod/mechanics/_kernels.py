@@ -240,27 +240,9 @@ def turning_kernel(strain: Strain, cables: int) -> ca.Function:
 
 def spd_solve_kernel(n: int) -> ca.Function:
     """(lower triangle of A, b) -> A^-1 b for a symmetric positive definite A (n, n), by A = L D L'."""
-    lower = ca.SX.sym("A", ca.Sparsity.lower(n))  # type: ignore[call-overload]
-    b = ca.SX.sym("b", n)
-    L = [[lower[i, j] for j in range(i + 1)] for i in range(n)]
-    inverse_pivot: list[ca.SX] = []
-    x = [b[i] for i in range(n)]
-    for i in range(n):
-        scaled = [L[i][j] for j in range(i)]
-        for j in range(i):
-            for k in range(j):
-                scaled[j] -= scaled[k] * L[j][k]
-            L[i][j] = scaled[j] * inverse_pivot[j]
-        pivot = L[i][i]
-        for j in range(i):
-            pivot -= scaled[j] * L[i][j]
-            x[i] -= L[i][j] * x[j]
-        inverse_pivot.append(1 / pivot)
-    x = [value * factor for value, factor in zip(x, inverse_pivot, strict=True)]
-    for i in reversed(range(n)):
-        for k in range(i + 1, n):
-            x[i] -= L[k][i] * x[k]
-    return ca.Function("spd_solve", [lower, b], [ca.vertcat(*x)], ["A", "b"], ["x"])
+    lower, b = ca.SX.sym("A", ca.Sparsity.lower(n)), ca.SX.sym("b", n)  # type: ignore[call-overload]
+    diagonal, unit, order = ca.ldl(ca.tril2symm(lower), False)
+    return ca.Function("spd_solve", [lower, b], [ca.ldl_solve(b, diagonal, unit, order)], ["A", "b"], ["x"])
 
 
 _INTERVAL = ("basis_a", "basis_b", "rest_a", "rest_b", "h")
