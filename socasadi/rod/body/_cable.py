@@ -79,10 +79,12 @@ class Cable:
     friction
         Coefficient of friction mu along the routing. The tension falls from the start by the capstan law
         exp(-mu times the angle that the cable has turned through), which holds while the cable is being pulled.
+        Kinks where a strain jumps are not counted in that angle.
     drive
         "tension": the input is the tension, N, and a negative one pushes. "length": the input is the length, m, that
         the actuator leaves between start and end: a shorter one pulls, with the tension
-        ``stiffness`` (length - input).
+        ``stiffness`` (length - input). The shorter the substep of the simulation, the stiffer it may be: some
+        1e5 N/m for a rod like the preset "paper" at the default substep.
     stiffness
         Of a cable driven by length, N/m: E A / length of the wire between actuator and end.
     slack

@@ -61,7 +61,7 @@ class Strain:
             basis = getattr(self, name)
             if isinstance(basis, Legendre):  # one way to say it, so that equal strains compare equal
                 object.__setattr__(self, name, basis.order)
-            elif isinstance(basis, Integral) and not isinstance(basis, bool) and basis >= 0:
+            elif isinstance(basis, Integral) and not isinstance(basis, bool) and int(basis) >= 0:
                 object.__setattr__(self, name, int(basis))
             elif basis is not None and not all(hasattr(basis, part) for part in ("size", "degree", "breaks", "values")):
                 raise ValueError(

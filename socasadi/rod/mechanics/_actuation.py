@@ -9,8 +9,9 @@ import numpy as np
 from .._quadrature import gauss_legendre
 from ..body import Cable, Chamber
 from . import _kernels
-from ._mesh import CableSpan, Mesh, route_at
+from ._mesh import Mesh
 from ._parameters import Parameters
+from ._routing import Span, route_at, spans_of
 
 if TYPE_CHECKING:
     from .._rod import Rod
@@ -27,9 +28,9 @@ class Actuation:
         """q -> (generalised force per unit of tension (n, cables), lengths (cables,))"""
         rod, q = self._rod, ca.MX.sym("q", self._rod.dof)
         # Cables that share their nodes go through the kernels together.
-        groups: dict[tuple[tuple[CableSpan, ...], bool], list[int]] = {}
+        groups: dict[tuple[tuple[Span, ...], bool], list[int]] = {}
         for i, cable in enumerate(rod.cables):
-            groups.setdefault((self._mesh.spans_of(cable), _rubs(cable)), []).append(i)
+            groups.setdefault((spans_of(cable, self._mesh), _rubs(cable)), []).append(i)
         columns: dict[int, ca.MX] = {}
         lengths: dict[int, ca.MX] = {}
         for (spans, rubs), members in groups.items():
@@ -60,7 +61,7 @@ class Actuation:
         return any(cable.drive == "length" for cable in self._rod.cables)
 
     def _group(
-        self, q: ca.MX, cables: list[Cable | Chamber], spans: tuple[CableSpan, ...], rubs: bool
+        self, q: ca.MX, cables: list[Cable | Chamber], spans: tuple[Span, ...], rubs: bool
     ) -> tuple[ca.MX, ca.MX]:
         """Columns (n, cables) and lengths of cables that have the same nodes."""
         m, divisions = len(cables), self._rod.divisions
@@ -68,10 +69,8 @@ class Actuation:
         length, turned = ca.MX(ca.DM.zeros(m)), ca.MX(ca.DM.zeros(m))
         pulls = self._parameters.lift(ca.vertcat(*(cable.pull for cable in cables)))
         for span in spans:
-            own, kernel = (
-                q[self._mesh.coordinates[span.division]],
-                _kernels.cable_kernel(divisions[span.division].strain, m),
-            )
+            own = q[self._mesh.coordinates[span.division]]
+            kernel = _kernels.cable_kernel(divisions[span.division].strain, m)
             remaining = [pulls] * len(span.nodes)
             if rubs:
                 factors, turned = self._capstan(own, cables, span, turned)
@@ -85,7 +84,7 @@ class Actuation:
         return ca.vertcat(*blocks), length
 
     def _capstan(
-        self, own: ca.MX, cables: list[Cable | Chamber], span: CableSpan, turned: ca.MX
+        self, own: ca.MX, cables: list[Cable | Chamber], span: Span, turned: ca.MX
     ) -> tuple[list[ca.MX], ca.MX]:
         """What friction leaves of the tension at each node, exp(-friction x angle turned since the start), and the
         angle turned up to the end of the span."""
@@ -120,12 +119,9 @@ def _rubs(cable: Cable | Chamber) -> bool:
 
 def _running_integrals(points: int) -> np.ndarray:
     """Matrix (points, points): values at the Gauss points times column j integrate from 0 to the j-th of them."""
-    x, _ = gauss_legendre(points)
-    powers = np.arange(points)
-    return np.linalg.solve(np.vander(2 * x - 1, increasing=True).T, _antiderivative(2 * x - 1, powers))
-
-
-def _antiderivative(t: np.ndarray, powers: np.ndarray) -> np.ndarray:
-    """Integrals from -1 to t of t^k, over 2, a row for each power k."""
-    k = powers[:, None] + 1
-    return (t[None, :] ** k - (-1.0) ** k) / (2 * k)
+    t = 2 * gauss_legendre(points)[0] - 1
+    legendre = np.polynomial.legendre.legvander(t, points)
+    # The integral of P_k from -1 to t is (P_{k+1}(t) - P_{k-1}(t)) / (2 k + 1), with P_{-1} = -1 for k = 0.
+    below = np.column_stack([-np.ones(points), legendre[:, : points - 1]])
+    integrals = (legendre[:, 1:] - below) / (2 * np.arange(points) + 1)
+    return np.linalg.solve(legendre[:, :points].T, integrals.T / 2)

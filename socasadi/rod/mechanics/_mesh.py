@@ -15,11 +15,8 @@ from ._kernels import GAUSS_POINTS
 
 if TYPE_CHECKING:
     from .._rod import Rod
-    from ..body import Cable, Chamber
 
 _SAME_PLACE = 1e-12  # of the length
-_CABLE_TOLERANCE = 1e-10
-_MOST_CABLE_POINTS = 64
 
 
 @dataclass(frozen=True)
@@ -53,16 +50,6 @@ class Node:
     rests: tuple[ca.SX, ca.SX]
     payloads: tuple[Payload, ...]
     point_loads: tuple[PointLoad, ...]
-
-
-@dataclass(frozen=True)
-class CableSpan:
-    """The stretch from ``a`` to ``b`` m of a cable within one piece, with its quadrature (arc length, weight), m."""
-
-    division: int
-    a: float
-    b: float
-    nodes: tuple[tuple[float, float], ...]
 
 
 class Mesh:
@@ -101,23 +88,10 @@ class Mesh:
             stops += [(s, 0.0) for s in (*marks, piece.b) if piece.a < s <= piece.b]
             start = piece.a
             for s in self._distinct([s for s, _ in stops]):
-                weight = sum(w for place, w in stops if self._same(place, s))
+                weight = sum(w for place, w in stops if self.same_place(place, s))
                 nodes.append(self._node(piece, start, s, float(weight)))
                 start = s
         return nodes
-
-    def spans_of(self, cable: Cable | Chamber) -> tuple[CableSpan, ...]:
-        """A cable's way through the pieces of the rod.
-
-        As many points in each piece as the cable's length and its derivatives take to converge.
-        """
-        end = self._rod.length if cable.end is None else cable.end
-        spans = []
-        for piece in self.pieces:
-            a, b = max(piece.a, cable.start), min(piece.b, end)
-            if a < b and not self._same(a, b):
-                spans.append(CableSpan(piece.division, a, b, _converged(cable, a, b, piece.points)))
-        return tuple(spans)
 
     def local(self, division: int, s: float) -> float:
         """Arc length ``s`` as the fraction x of its division."""
@@ -132,7 +106,7 @@ class Mesh:
         here = [
             body
             for body in (*rod.payloads, *rod.loads)
-            if not isinstance(body, DistributedLoad) and self._same(rod.length if body.s is None else body.s, stop)
+            if not isinstance(body, DistributedLoad) and self.same_place(rod.length if body.s is None else body.s, stop)
         ]
         return Node(
             piece.division,
@@ -146,26 +120,14 @@ class Mesh:
             tuple(body for body in here if isinstance(body, PointLoad)),
         )
 
-    def _same(self, s: float, other: float) -> bool:
+    def same_place(self, s: float, other: float) -> bool:
+        """Whether two arc lengths differ by rounding alone."""
         return abs(s - other) <= _SAME_PLACE * self._rod.length
 
     def _distinct(self, places: list[float]) -> list[float]:
         """``places`` in order, those that rounding alone tells apart taken as one."""
         ordered = sorted(float(s) for s in places)
-        return ordered[:1] + [b for a, b in pairwise(ordered) if not self._same(a, b)]
-
-
-def route_at(cable: Cable | Chamber, s: float) -> list[ca.SX]:
-    """Offset (3,) of the cable in the section at ``s``, its first and its second derivative with respect to s."""
-    place, derivatives = _route(cable)
-    return ca.substitute(derivatives, [place], [ca.SX(s)])
-
-
-def _route(cable: Cable | Chamber) -> tuple[ca.SX, list[ca.SX]]:
-    place = ca.SX.sym("s")
-    offset = ca.SX(ca.vertcat(0, *cable.at(place)))
-    slope = ca.jacobian(offset, place)
-    return place, [ca.densify(value) for value in (offset, slope, ca.jacobian(slope, place))]
+        return ordered[:1] + [b for a, b in pairwise(ordered) if not self.same_place(a, b)]
 
 
 def loads_at(rod: Rod, node: Node) -> tuple[list[Number], list[Number]]:
@@ -190,27 +152,3 @@ def loads_at(rod: Rod, node: Node) -> tuple[list[Number], list[Number]]:
 def inertia_at(rod: Rod, node: Node) -> list[Number]:
     """Diagonal (6,) of the section's mass matrix per metre at a node."""
     return rod.divisions[node.division].inertia_at(node.x)
-
-
-def _converged(cable: Cable | Chamber, a: float, b: float, points: int) -> tuple[tuple[float, float], ...]:
-    """Gauss points and weights between ``a`` and ``b`` that integrate the cable's length and moments to rounding."""
-    place, (offset, slope, _) = _route(cable)
-    along = ca.vertcat(1 + slope[0], slope[1], slope[2])
-    speed = ca.norm_2(along)
-    symbols = ca.vertcat(ca.SX(0, 1), *(s for s in ca.symvar(offset) if not ca.is_equal(s, place)))
-    integrand = ca.Function("integrand", [place, symbols], [ca.vertcat(speed, ca.cross(offset, along / speed))])
-
-    def integrate(count: int) -> tuple[np.ndarray, list[tuple[float, float]]]:
-        x, w = gauss_legendre(count)
-        nodes = list(zip((a + (b - a) * x).tolist(), ((b - a) * w).tolist(), strict=True))
-        # A route's symbols have no values yet; at one they show its shape.
-        return sum(w * integrand(s, ca.DM.ones(symbols.shape)).full()[:, 0] for s, w in nodes), nodes  # type: ignore[return-value]
-
-    value, nodes = integrate(points)
-    while points < _MOST_CABLE_POINTS:
-        points = min(2 * points, _MOST_CABLE_POINTS)
-        finer, more = integrate(points)
-        if np.abs(finer - value).max() <= _CABLE_TOLERANCE * (1 + np.abs(finer).max()):
-            break
-        value, nodes = finer, more
-    return tuple(nodes)
