@@ -3,6 +3,7 @@
 ``body`` holds what a rod is made of, ``mechanics`` the equations that follow, and :class:`Rod` puts them together.
 """
 
+from ._pointing import pointing
 from ._rod import Rod
 from .body import (
     Basis,
@@ -55,4 +56,5 @@ __all__ = [
     "cables_around",
     "piecewise_constant",
     "piecewise_linear",
+    "pointing",
 ]

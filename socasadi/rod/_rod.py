@@ -51,8 +51,8 @@ class Rod:
     gravity
         Acceleration (3,), m/s^2, world frame.
     base_rotation, base_position
-        The base frame in the world: rotation matrix (3, 3), its columns the base's axes, and position (3,), m. By
-        default the two frames are one.
+        The base frame in the world: rotation matrix (3, 3), its columns the base's axes (:func:`pointing` makes one),
+        and position (3,), m. By default the two frames are one.
     payloads
         :class:`Payload`, rigid bodies that the rod carries.
     loads
@@ -112,17 +112,17 @@ class Rod:
         section: Any = None,
         material: Material | None = None,
         strain: Strain | None = None,
-        cables: Sequence[Cable | Chamber] = (),
+        cables: Cable | Chamber | Sequence[Cable | Chamber] = (),
         *,
         divisions: Sequence[Division] | Division = (),
         gravity: Sequence[Any] = _ZERO,
         base_rotation: Any = _UPRIGHT,
         base_position: Sequence[float] = _ZERO,
-        payloads: Sequence[Payload] = (),
-        loads: Sequence[PointLoad | DistributedLoad] = (),
+        payloads: Payload | Sequence[Payload] = (),
+        loads: PointLoad | DistributedLoad | Sequence[PointLoad | DistributedLoad] = (),
         drag: Drag | None = None,
         quadrature_points: int | None = None,
-        parameters: Sequence[ca.SX] = (),
+        parameters: ca.SX | Sequence[ca.SX] = (),
         parameter_values: Sequence[float] | None = None,
     ) -> None:
         given = {
@@ -281,20 +281,24 @@ class Rod:
         """Points (..., 3) of the world, m, as the base sees them."""
         return (points - np.array(self.base_position)) @ np.array(self.base_rotation)
 
+    def frames(self, q: Sequence[float] | np.ndarray, n: int = 50) -> np.ndarray:
+        """Homogeneous poses (n, 4, 4) of ``n`` sections evenly spaced along the rod at ``q``, world frame."""
+        q = vector("Rod.frames", "q", q, self.dof)
+        poses = self.valued.pose.map(n)(ca.repmat(ca.DM(q), 1, n), ca.DM(np.linspace(0, self.length, n)).T).full()
+        return poses.reshape(4, n, 4).swapaxes(0, 1)
+
     def centreline(self, q: Sequence[float] | np.ndarray, n: int = 50) -> np.ndarray:
         """Positions (n, 3), m, of ``n`` points evenly spaced along the rod at coordinates ``q``, world frame."""
-        q = vector("Rod.centreline", "q", q, self.dof)
-        poses = self.valued.pose.map(n)(ca.repmat(ca.DM(q), 1, n), ca.DM(np.linspace(0, self.length, n)).T).full()
-        return poses[:3, 3::4].T
+        return self.frames(q, n)[:, :3, 3]
 
     def equilibrium(
         self,
         tension: Sequence[float] | np.ndarray | None = None,
-        tip_force: Sequence[float] | np.ndarray = _ZERO,
-        tip_moment: Sequence[float] | np.ndarray = _ZERO,
+        tip_force: Sequence[Any] | np.ndarray = _ZERO,
+        tip_moment: Sequence[Any] | np.ndarray = _ZERO,
         *,
-        follower_force: Sequence[float] | np.ndarray = _ZERO,
-        follower_moment: Sequence[float] | np.ndarray = _ZERO,
+        follower_force: Sequence[Any] | np.ndarray = _ZERO,
+        follower_moment: Sequence[Any] | np.ndarray = _ZERO,
         lengths: Sequence[float] | np.ndarray | None = None,
     ) -> mechanics.Equilibrium:
         """Static equilibrium under constant loads, reached by increasing them together from zero.

@@ -61,6 +61,10 @@ class Equilibrium:
         """Lengths (cables,) of the cables, m."""
         return self.rod.model.cable_lengths(self.q).full()[:, 0]
 
+    def frames(self, n: int = 50) -> np.ndarray:
+        """Homogeneous poses (n, 4, 4) of ``n`` sections evenly spaced along the rod, base first and tip last."""
+        return self.rod.frames(self.q, n)
+
     def centreline(self, n: int = 50) -> np.ndarray:
         """Positions (n, 3), m, of ``n`` points evenly spaced along the rod, base first and tip last."""
         return self.rod.centreline(self.q, n)
