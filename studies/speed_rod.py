@@ -13,6 +13,8 @@ import argparse
 import os
 import tempfile
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,35 +26,56 @@ from peers.case import COUPLE, DENSITY, DURATION, LENGTH, RADIUS, SAMPLE, TIMES,
 from socasadi.codegen import Buffered, compiled
 from socasadi.rod import Material, PointLoad, Rod, Section, Strain
 
-WHOLE, NO_SHEAR, PLANE = "whole, 3-D", "neither torsion nor shear, 3-D", "plane"
-CONVERGED = {
-    WHOLE: {"strain": {"bending_z": 7, "stretch": 4, "shear_y": 5}, "points": 14, "step": 5e-4},
-    NO_SHEAR: {"strain": {"bending_z": 7, "stretch": 4}, "points": 14, "step": 5e-4},
-}
-CONVERGED[PLANE] = CONVERGED[WHOLE]
 SIX = {"bending_y": 2, "bending_z": 2, "torsion": 0, "stretch": 0, "shear_y": 0, "shear_z": 0}
-OURS: list[tuple[str, dict[str, Any]]] = [
-    (WHOLE, {"strain": SIX, "points": 10, "step": 0.025}),
-    (WHOLE, {"strain": SIX, "points": 4, "step": 0.025}),
-    (NO_SHEAR, {"strain": {"bending_y": 2, "bending_z": 2, "stretch": 0}, "points": 4, "step": 0.025}),
-    (PLANE, {"strain": {"bending_z": 2, "stretch": 0, "shear_y": 0}, "points": 4, "step": 0.025}),
-]
-PEERS: list[tuple[str, Any, dict[str, Any], dict[str, Any] | None]] = [
-    (WHOLE, exudyn, {"beam": "spatial", "elements": 12, "step": SAMPLE / 3}, {"elements": 64, "step": SAMPLE / 50}),
-    (WHOLE, pyelastica, {"elements": 20, "step": SAMPLE / 80}, {"elements": 80, "step": SAMPLE / 500}),
-    (WHOLE, soromox, {"orders": (0, 2, 2, 0, 0, 0), "solver": "Kvaerno5", "step": 0.01, "rtol": 1e-4}, None),
-    (NO_SHEAR, exudyn, {"beam": "cable", "elements": 2, "step": 0.025}, {"elements": 16, "step": SAMPLE / 50}),
-    (NO_SHEAR, soromox, {"orders": (-1, 2, 2, 0, -1, -1), "step": 1e-3}, None),
-    (PLANE, exudyn, {"beam": "planar", "elements": 2, "step": 0.025}, {"elements": 16, "step": SAMPLE / 50}),
+BENDING = {"bending_y": 2, "bending_z": 2, "stretch": 0}
+FINE, FINEST = {"points": 14, "step": 5e-4}, SAMPLE / 50
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of model: our runs, our converged run, and peers with the settings that take them to convergence."""
+
+    name: str
+    ours: list[dict[str, Any]]
+    converged: dict[str, Any]
+    peers: list[tuple[Callable[..., Run], dict[str, Any], dict[str, Any]]]
+
+
+KINDS = [
+    Kind(
+        "in three dimensions, with torsion, stretch and shear",
+        [{"strain": SIX, "points": 10, "step": 0.025}, {"strain": SIX, "points": 4, "step": 0.025}],
+        {"strain": {"bending_z": 7, "stretch": 4, "shear_y": 5}, **FINE},
+        [
+            (exudyn, {"beam": "spatial", "elements": 12, "step": SAMPLE / 3}, {"elements": 64, "step": FINEST}),
+            (pyelastica, {"elements": 20, "step": SAMPLE / 80}, {"elements": 80, "step": SAMPLE / 500}),
+            (soromox, {"orders": (0, 2, 2, 0, 0, 0), "solver": "Kvaerno5", "step": 0.01, "rtol": 1e-4}, {}),
+        ],
+    ),
+    Kind(
+        "in three dimensions, with stretch alone",
+        [{"strain": BENDING, "points": 4, "step": 0.025}],
+        {"strain": {"bending_z": 7, "stretch": 4}, **FINE},
+        [
+            (exudyn, {"beam": "cable", "elements": 2, "step": 0.025}, {"elements": 16, "step": FINEST}),
+            (soromox, {"orders": (-1, 2, 2, 0, -1, -1), "step": 1e-3}, {}),
+        ],
+    ),
+    Kind(
+        "in the plane, with stretch and shear",
+        [{"strain": {"bending_z": 2, "stretch": 0, "shear_y": 0}, "points": 4, "step": 0.025}],
+        {"strain": {"bending_z": 7, "stretch": 4, "shear_y": 5}, **FINE},
+        [(exudyn, {"beam": "planar", "elements": 2, "step": 0.025}, {"elements": 16, "step": FINEST})],
+    ),
 ]
 
 
-def rod(strain: dict[str, int], points: int, **changes: Any) -> Rod:
+def rod(strain: dict[str, Any], points: int, **changes: Any) -> Rod:
     material = Material(YOUNG, poisson=0.5, density=DENSITY, damping=VISCOSITY)
     return Rod(LENGTH, Section.circle(RADIUS), material, Strain(**strain), quadrature_points=points, **changes)
 
 
-def ours(strain: dict[str, int], points: int, step: float) -> Run:
+def ours(strain: dict[str, Any], points: int, step: float) -> Run:
     """The step couple by this package: one call of machine code for all the samples."""
     begin = time.perf_counter()
     bent = rod(strain, points, loads=(PointLoad(moment=(0, 0, COUPLE)),))
@@ -61,47 +84,45 @@ def ours(strain: dict[str, int], points: int, step: float) -> Run:
     nothing = np.zeros(3 * len(TIMES))
     call(rest, np.zeros(0), nothing)
     setup, walls, states = time.perf_counter() - begin, [], rest
-    for _ in range(50):
+    for _ in range(200):
         begin = time.perf_counter()
         (states,) = call(rest, np.zeros(0), nothing)
         walls.append(time.perf_counter() - begin)
     states = states.reshape(len(TIMES), -1)
     tip = np.array([bent.tip(x[: bent.dof]).full()[:, 0] for x in states])
-    name = f"socasadi, {', '.join(strain)}, {points} points, {1e3 * step:.3g} ms"
-    return Run(name, len(strain) > 3 or "bending_y" in strain, bent.dof, TIMES, tip, min(walls), setup)
+    name = f"socasadi, {len(strain)} strains, {points} points, {1e3 * step:.3g} ms"
+    return Run(name, "bending_y" in strain, bent.dof, TIMES, tip, min(walls), setup)
 
 
 def beside_peers(with_peers: bool) -> None:
-    print(f"{'':82} {'dof':>4} {'error / mm':>10} {'x real time':>11} {'setup / s':>9} {'MB':>5}")
-    answers = {kind: measured(ours, **settings) for kind, settings in CONVERGED.items() if kind != PLANE}
-    answers[PLANE] = answers[WHOLE]
-    fastest: dict[str, list[float]] = {}
-    for kind, settings in OURS:
-        run = measured(ours, **settings)
-        show(kind, run, answers[kind])
-        if isinstance(run, Run):
-            fastest.setdefault(kind, []).append(run.wall)
-    for kind, peer, settings, finest in PEERS if with_peers else []:
-        run = measured(peer, **settings)
-        show(kind, run, measured(peer, **settings | finest) if finest else answers[kind])
-        if isinstance(run, Run):
-            print(f"{'':82} {run.wall / min(fastest[kind]):.1f} times the time of socasadi's fastest of this kind")
+    for kind in KINDS:
+        print(
+            f"\n{kind.name:75} {'dof':>4} {'error / mm':>10} {'x real time':>11} {'x our time':>10} {'setup / s':>9} {'MB':>5}"
+        )
+        converged, walls = measured(ours, **kind.converged), []
+        for settings in kind.ours:
+            run = measured(ours, **settings)
+            walls += [run.wall] if isinstance(run, Run) else []
+            show(run, converged, min(walls))
+        for peer, settings, finest in kind.peers if with_peers else []:
+            run = measured(peer, **settings)
+            show(run, measured(peer, **settings | finest) if finest else converged, min(walls))
 
 
-def show(kind: str, run: Run | Absent, converged: Run | Absent) -> None:
-    if isinstance(run, Absent) or isinstance(converged, Absent):
-        absent = run if isinstance(run, Absent) else converged
-        print(f"{absent.name}: {absent.reason}")  # type: ignore[union-attr]
-        return
-    error = 1e3 * np.linalg.norm(run.tip - converged.tip, axis=1).max()
+def show(run: Run | Absent, converged: Run | Absent, fastest: float) -> None:
+    for absent in (run, converged):
+        if isinstance(absent, Absent):
+            print(f"{absent.name}: {absent.reason}")
+            return
+    error = 1e3 * np.linalg.norm(run.tip - converged.tip, axis=1).max()  # type: ignore[union-attr]
     print(
-        f"{f'{run.name} ({kind})':82} {run.dof:4} {error:10.3f} {DURATION / run.wall:11.0f} {run.setup:9.2f} "
-        f"{run.memory:5.0f}",
+        f"{run.name:75} {run.dof:4} {error:10.3f} {DURATION / run.wall:11.0f} {run.wall / fastest:10.1f} "  # type: ignore[union-attr]
+        f"{run.setup:9.2f} {run.memory:5.0f}",  # type: ignore[union-attr]
         flush=True,
     )
 
 
-def legendre(dof: int) -> dict[str, int]:
+def legendre(dof: int) -> dict[str, Any]:
     """Bending about both axes as far as ``dof`` goes, with constant torsion and stretch."""
     half = (dof - 2) // 2
     return {"bending_y": half - 1, "bending_z": half - 1, "torsion": 0, "stretch": 0}
@@ -123,19 +144,17 @@ def right_hand_side(dof: int, points: int) -> float:
 
 def growth(folder: Path) -> None:
     dofs, counts = (4, 6, 8, 10, 14, 20, 28, 40), (4, 6, 10, 16, 24, 40)
-    by_dof = [1e6 * right_hand_side(dof, max(10, dof // 2)) for dof in dofs]
-    at_ten = [1e6 * right_hand_side(dof, 20) for dof in dofs]
+    by_dof = [1e6 * right_hand_side(dof, 20) for dof in dofs]
     by_points = [1e6 * right_hand_side(10, points) for points in counts]
     print("\nright-hand side, us:")
     print(f"  10 coordinates, 10 points: {by_points[2]:.2f}")
-    print("  20 points, by coordinates:", ", ".join(f"{n}: {t:.1f}" for n, t in zip(dofs, at_ten, strict=True)))
+    print("  20 points, by coordinates:", ", ".join(f"{n}: {t:.1f}" for n, t in zip(dofs, by_dof, strict=True)))
     print("  10 coordinates, by points:", ", ".join(f"{n}: {t:.1f}" for n, t in zip(counts, by_points, strict=True)))
-    slope = [np.polyfit(np.log(x[-4:]), np.log(y[-4:]), 1)[0] for x, y in ((dofs, at_ten), (counts, by_points))]
+    slope = [np.polyfit(np.log(x[-4:]), np.log(y[-4:]), 1)[0] for x, y in ((dofs, by_dof), (counts, by_points))]
     print(f"  power over the upper half: {slope[0]:.2f} in coordinates, {slope[1]:.2f} in points")
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True, layout="constrained")
-    left.loglog(dofs, at_ten, "o-", label="20 points")
-    left.loglog(dofs, by_dof, "s--", label="points as coordinates ask for: max(10, n / 2)")
-    left.loglog(dofs[3:], [at_ten[3] * (n / dofs[3]) ** 2 for n in dofs[3:]], ":", color="0.5", label="square")
+    left.loglog(dofs, by_dof, "o-", label="20 points")
+    left.loglog(dofs[3:], [by_dof[3] * (n / dofs[3]) ** 2 for n in dofs[3:]], ":", color="0.5", label="square")
     left.set(xlabel="coordinates n", ylabel="one right-hand side / µs", xticks=dofs, xticklabels=dofs)
     right.loglog(counts, by_points, "o-", label="10 coordinates")
     right.loglog(counts, [by_points[2] * n / counts[2] for n in counts], ":", color="0.5", label="proportional")

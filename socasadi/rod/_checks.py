@@ -1,5 +1,5 @@
 from collections.abc import Callable
-from math import isfinite
+from math import isfinite, nan
 from numbers import Integral
 from typing import Any, SupportsFloat, TypeAlias
 
@@ -18,6 +18,21 @@ def finite(owner: str, **values: Any) -> None:
 def positive(owner: str, **values: Any) -> None:
     """ValueError unless every value is a finite number above zero, or symbolic."""
     _demand(owner, values, lambda value: value > 0, "a finite number above zero")
+
+
+def positive_number(owner: str, **values: Any) -> None:
+    """ValueError unless every value is a finite number above zero; a symbol is not."""
+    for name, value in values.items():
+        if symbolic(value):
+            raise ValueError(f"{owner}: {name} is the expression {value}, but must be a finite number above zero")
+    positive(owner, **values)
+
+
+def flag(owner: str, **values: Any) -> None:
+    """TypeError unless every value is True or False."""
+    for name, value in values.items():
+        if not isinstance(value, bool | np.bool_):
+            raise TypeError(f"{owner}: {name} is {value!r}, but must be True or False")
 
 
 def not_negative(owner: str, **values: Any) -> None:
@@ -70,6 +85,19 @@ def matrix(owner: str, name: str, value: Any, size: int) -> tuple[tuple[Any, ...
     return tuple(map(tuple, _array(owner, name, value, (size, size)).tolist()))
 
 
+def symmetric(owner: str, name: str, value: Any, size: int, *, definite: bool) -> tuple[tuple[Any, ...], ...]:
+    """Like :func:`matrix`; ValueError unless symmetric positive definite (semidefinite), as far as it is numbers."""
+    rows = matrix(owner, name, value, size)
+    if not symbolic(rows):
+        array = np.array(rows)
+        smallest, largest = np.linalg.eigvalsh((array + array.T) / 2)[[0, -1]]
+        least = 1e-14 * largest if definite else -1e-12 * max(largest, 0.0)
+        if not np.allclose(array, array.T, rtol=1e-9, atol=0) or smallest < least or (definite and largest <= 0):
+            kind = "definite" if definite else "semidefinite"
+            raise ValueError(f"{owner}: {name} is {array.tolist()}, but must be symmetric positive {kind}")
+    return rows
+
+
 def _array(owner: str, name: str, value: object, shape: tuple[int, ...]) -> np.ndarray:
     count = " x ".join(map(str, shape))
     try:
@@ -89,6 +117,15 @@ def _demand(owner: str, values: dict[str, Any], holds: Callable[[Any], bool], wh
     for name, value in values.items():
         if symbolic(value):
             continue
-        number = isinstance(value, SupportsFloat) and not isinstance(value, bool)
-        if not (number and isfinite(float(value)) and holds(value)):
+        if not (isfinite(_number(value)) and holds(value)):
             raise ValueError(f"{owner}: {name} is {value!r}, but must be {what}")
+
+
+def _number(value: Any) -> float:
+    """``value`` as a float; NaN for what is no number."""
+    if not isinstance(value, SupportsFloat) or isinstance(value, bool):
+        return nan
+    try:
+        return float(value)
+    except (TypeError, ValueError, RuntimeError, NotImplementedError):  # a CasADi MX has a float that fails
+        return nan

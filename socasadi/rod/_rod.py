@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from math import inf
 from typing import Any, Literal
@@ -11,7 +11,8 @@ import numpy as np
 
 from ..codegen import compiled
 from . import _validation, mechanics
-from ._checks import numbers, vector
+from ._checks import numbers, positive_number, vector, whole
+from ._symbols import with_numbers
 from .body import (
     Cable,
     Chamber,
@@ -104,7 +105,6 @@ class Rod:
     loads: tuple[PointLoad | DistributedLoad, ...]
     drag: Drag | None
     parameters: tuple[ca.SX, ...]
-    parameter_values: tuple[float, ...] | None
 
     def __init__(
         self,
@@ -123,7 +123,6 @@ class Rod:
         drag: Drag | None = None,
         quadrature_points: int | None = None,
         parameters: ca.SX | Sequence[ca.SX] = (),
-        parameter_values: Sequence[float] | None = None,
     ) -> None:
         given = {
             name: value
@@ -141,16 +140,12 @@ class Rod:
         put(self, "cables", _validation.all_of("cables", cables, (Cable, Chamber)))
         put(self, "gravity", numbers("Rod", "gravity", gravity, 3))
         put(self, "base_rotation", _validation.rotation(base_rotation))
-        put(self, "base_position", numbers("Rod", "base_position", base_position, 3))
+        put(self, "base_position", tuple(vector("Rod", "base_position", base_position, 3).tolist()))
         put(self, "payloads", _validation.all_of("payloads", payloads, (Payload,)))
         put(self, "loads", _validation.all_of("loads", loads, (PointLoad, DistributedLoad)))
         put(self, "drag", drag)
-        symbols = [parameters] if isinstance(parameters, ca.SX) else list(parameters)
-        put(self, "parameters", tuple(symbol for column in symbols for symbol in ca.vertsplit(ca.vec(column))))
-        put(self, "parameter_values", None)
-        if parameter_values is not None:
-            values = vector("Rod", "parameter_values", parameter_values, len(self.parameters))
-            put(self, "parameter_values", tuple(values.tolist()))
+        columns = _validation.all_of("parameters", parameters, (ca.SX,))
+        put(self, "parameters", tuple(symbol for column in columns for symbol in ca.vertsplit(ca.vec(column))))
         if drag is not None and not isinstance(drag, Drag):
             raise TypeError(f"Rod: drag is {drag!r}, but must be a Drag or None")
         _validation.check_places(self)
@@ -259,8 +254,17 @@ class Rod:
         return self.statics.neutral
 
     def at(self, values: Sequence[float] | np.ndarray) -> Rod:
-        """The rod with ``values`` for its :attr:`parameters`, in their order: a rod of numbers, ready to simulate."""
-        return replace(self, parameter_values=values)  # type: ignore[arg-type]
+        """The rod with ``values`` for its :attr:`parameters`, in their order: a rod of numbers, ready to simulate.
+
+        Raises
+        ------
+        ValueError
+            There are not as many values as parameters, one is not finite, or one gives the rod what no rod can have.
+        """
+        symbols = ca.vertcat(ca.SX(0, 1), *self.parameters)
+        given = ca.DM(vector("Rod.at", "values", values, len(self.parameters)))
+        parts: dict[str, Any] = {f.name: with_numbers(getattr(self, f.name), symbols, given) for f in fields(self)}
+        return Rod(**{**parts, "parameters": ()})
 
     @property
     def base_pose(self) -> np.ndarray:
@@ -272,7 +276,7 @@ class Rod:
     @property
     def valued(self) -> Rod:
         """This rod; ValueError when parameters have no values, which a simulation in numbers needs."""
-        if self._free:
+        if self.parameters:
             names = ", ".join(str(symbol) for symbol in self.parameters)
             raise ValueError(f"Rod: the parameters {names} have no values; use rod.at([...]) to give them")
         return self
@@ -283,7 +287,8 @@ class Rod:
 
     def frames(self, q: Sequence[float] | np.ndarray, n: int = 50) -> np.ndarray:
         """Homogeneous poses (n, 4, 4) of ``n`` sections evenly spaced along the rod at ``q``, world frame."""
-        q = vector("Rod.frames", "q", q, self.dof)
+        q = vector("Rod", "q", q, self.dof)
+        n = whole("Rod", "n", n, 2)
         poses = self.valued.pose.map(n)(ca.repmat(ca.DM(q), 1, n), ca.DM(np.linspace(0, self.length, n)).T).full()
         return poses.reshape(4, n, 4).swapaxes(0, 1)
 
@@ -399,7 +404,7 @@ class Rod:
 
     def step_expression(self, sample_time: float, substep: float | None = None) -> ca.Function:
         """:meth:`step` before compilation, to be part of a larger Function or to be differentiated."""
-        if substep is None and self._free:
+        if substep is None and self.parameters:
             raise ValueError(
                 "Rod.step: substep is not given, and its default follows from the values of the parameters; give it, s"
             )
@@ -413,6 +418,8 @@ class Rod:
         "cvodes" is Sundials' multistep method at a tolerance of 1e-11, "collocation" Legendre collocation of degree 4
         on ``elements`` intervals.
         """
+        positive_number("Rod.reference_step", sample_time=sample_time)
+        whole("Rod.reference_step", "elements", elements, 1)
         if method not in ("cvodes", "collocation"):
             raise ValueError(f"Rod.reference_step: method is {method!r}, but must be 'cvodes' or 'collocation'")
         return mechanics.reference(self.model, sample_time, method, elements)
@@ -434,7 +441,7 @@ class Rod:
         >>> A.shape, B.shape, C.shape
         ((16, 16), (16, 3), (2, 16))
         """
-        return mechanics.linearise(self.valued, equilibrium or self.equilibrium(), sample_time, output)
+        return mechanics.linearise(self.valued, self._own(equilibrium), sample_time, output)
 
     def modes(self, equilibrium: mechanics.Equilibrium | None = None) -> mechanics.Modes:
         """Undamped frequencies, Hz, and damping ratios about ``equilibrium`` (default: as in :meth:`linearise`).
@@ -444,7 +451,7 @@ class Rod:
         >>> Rod.preset("paper").modes().frequency[:2].round(4).tolist()
         [0.7365, 0.7365]
         """
-        at = equilibrium or self.equilibrium()
+        at = self._own(equilibrium)
         return mechanics.modes(self.valued, at.stiffness, at.q)
 
     @cached_property
@@ -456,9 +463,19 @@ class Rod:
     def _steps(self) -> dict[tuple[float, float | None], ca.Function]:
         return {}
 
-    @property
-    def _free(self) -> bool:
-        return bool(self.parameters) and self.parameter_values is None
+    def _own(self, equilibrium: mechanics.Equilibrium | None) -> mechanics.Equilibrium:
+        """An equilibrium of this rod, the one with neutral inputs unless one is given."""
+        if equilibrium is None:
+            return self.equilibrium()
+        if not isinstance(equilibrium, mechanics.Equilibrium):
+            raise TypeError(f"Rod: equilibrium is {equilibrium!r}, but must be an Equilibrium, as equilibrium() gives")
+        shapes = (len(equilibrium.q), len(equilibrium.input))
+        if shapes != (self.dof, len(self.cables)):
+            raise ValueError(
+                f"Rod: the equilibrium is another rod's: it has {shapes[0]} coordinates and {shapes[1]} inputs, "
+                f"this rod {self.dof} and {len(self.cables)}"
+            )
+        return equilibrium
 
     def _bounds(self, bounds: tuple[Any, Any]) -> tuple[np.ndarray, np.ndarray]:
         try:

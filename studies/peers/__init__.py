@@ -4,9 +4,9 @@ One core: every run has a process of its own, bound to one processor; Exudyn and
 PyElastica's loops are serial.
 """
 
+from ._exudyn import exudyn
+from ._pyelastica import pyelastica
+from ._soromox import soromox
 from .case import Absent, Run, measured
-from .exudyn import exudyn
-from .pyelastica import pyelastica
-from .soromox import soromox
 
 __all__ = ["Absent", "Run", "exudyn", "measured", "pyelastica", "soromox"]

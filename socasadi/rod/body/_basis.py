@@ -106,9 +106,7 @@ class BSpline:
     def __post_init__(self) -> None:
         object.__setattr__(self, "degree", whole("BSpline", "degree", self.degree, 0))
         if isinstance(self.pieces, Sequence | np.ndarray):
-            inner = tuple(float(knot) for knot in self.pieces)
-            if not all(a < b for a, b in zip((0.0, *inner), (*inner, 1.0), strict=True)):
-                raise ValueError(f"BSpline: the inner knots are {inner}, but must increase between 0 and 1")
+            inner = _increasing("BSpline", "pieces", self.pieces)
         else:
             count = whole("BSpline", "pieces", self.pieces, 1)
             inner = tuple(k / count for k in range(1, count))
@@ -175,12 +173,10 @@ class UserBasis:
     breaks: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "functions", tuple(self.functions))
+        functions = (self.functions,) if callable(self.functions) else tuple(self.functions)
+        object.__setattr__(self, "functions", functions)
         object.__setattr__(self, "degree", whole("UserBasis", "degree", self.degree, 0))
-        breaks = tuple(float(x) for x in self.breaks)
-        if not all(a < b for a, b in zip((0.0, *breaks), (*breaks, 1.0), strict=True)):
-            raise ValueError(f"UserBasis: breaks is {breaks}, but must increase between 0 and 1")
-        object.__setattr__(self, "breaks", breaks)
+        object.__setattr__(self, "breaks", _increasing("UserBasis", "breaks", self.breaks))
         if not self.functions:
             raise ValueError("UserBasis: there are no functions; give at least one")
         x = ca.SX.sym("x")
@@ -199,6 +195,17 @@ class UserBasis:
 
     def values(self, x: ca.SX) -> list[ca.SX]:
         return [ca.SX(function(x)) for function in self.functions]
+
+
+def _increasing(owner: str, name: str, value: Any) -> tuple[float, ...]:
+    """``value`` as a tuple of numbers that increase between 0 and 1."""
+    try:
+        places = tuple(float(x) for x in value)
+    except (TypeError, ValueError):
+        places = (1.0,)
+    if not all(a < b for a, b in pairwise((0.0, *places, 1.0))):
+        raise ValueError(f"{owner}: {name} is {value!r}, but must be numbers that increase between 0 and 1")
+    return places
 
 
 def _ratio(numerator: ca.SX, denominator: float) -> ca.SX:

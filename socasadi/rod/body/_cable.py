@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import casadi as ca
 
-from .._checks import Number, finite, not_negative, numbers, positive, symbolic
+from .._checks import Number, finite, flag, not_negative, numbers, positive, symbolic, whole
 from ._load import check_span
 
 Route = tuple[Any, Any] | Callable[[Any], Any]
@@ -116,6 +116,7 @@ class Cable:
     def __post_init__(self) -> None:
         _check_route(self, "Cable")
         not_negative("Cable", friction=self.friction)
+        flag("Cable", slack=self.slack)
         if self.drive not in ("tension", "length"):
             raise ValueError(f"Cable: drive is {self.drive!r}, but must be 'tension' or 'length'")
         if self.drive == "length":
@@ -186,8 +187,10 @@ class Chamber:
         return _position(self.route, s)
 
 
-def cables_around(count: int, offset: float) -> tuple[Cable, ...]:
+def cables_around(count: int, offset: Number) -> tuple[Cable, ...]:
     """``count`` cables at ``offset`` m from the axis, evenly spaced, the first on +y, turning towards +z."""
+    count = whole("cables_around", "count", count, 1)
+    positive("cables_around", offset=offset)
     angles = [2 * pi * i / count for i in range(count)]
     return tuple(Cable((offset * cos(angle), offset * sin(angle))) for angle in angles)
 

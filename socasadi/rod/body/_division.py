@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from .._checks import Number, matrix, positive, symbolic, whole
+from .._checks import Number, matrix, positive_number, symmetric, whole
 from .._quadrature import gauss_legendre
 from ._material import Material
 from ._section import Section
@@ -68,9 +68,7 @@ class Division:
     quadrature_points: int | None = None
 
     def __post_init__(self) -> None:
-        if symbolic(self.length):
-            raise ValueError(f"Division: length is {self.length}, but must be a number: nodes are placed by it")
-        positive("Division", length=self.length)
+        positive_number("Division", length=self.length)
         object.__setattr__(self, "length", float(self.length))
         for name, kind in (("material", Material), ("strain", Strain)):
             if not isinstance(value := getattr(self, name), kind):
@@ -100,7 +98,12 @@ class Division:
 
     def section_at(self, x: float) -> Section:
         """The section at ``x``."""
-        return self.section if isinstance(self.section, Section) else self.section(x)  # type: ignore[operator]
+        if isinstance(self.section, Section):
+            return self.section
+        try:
+            return self.section(x)
+        except Exception as error:
+            raise ValueError(f"Division: section fails at x = {x:g}: {error}") from error
 
     def inertia_at(self, x: float) -> list[Number]:
         """Diagonal (6,) of the section's mass matrix per metre: kg m in the first three, kg/m in the last."""
@@ -135,14 +138,8 @@ class Division:
 
     def _given(self, name: str, x: float) -> ca.SX:
         given = getattr(self, name)
-        rows = matrix("Division", name, given(x) if callable(given) else given, 6)
-        if not symbolic(rows):
-            values = np.array(rows)
-            smallest, largest = np.linalg.eigvalsh((values + values.T) / 2)[[0, -1]]
-            least = 1e-14 * largest if name == "stiffness" else -1e-12 * max(largest, 0.0)
-            if not np.allclose(values, values.T, rtol=1e-9, atol=0) or smallest < least or (least > 0 and largest <= 0):
-                kind = "positive definite" if name == "stiffness" else "positive semidefinite"
-                raise ValueError(f"Division: {name} is {values.tolist()}, but must be symmetric {kind}")
+        value = given(x) if callable(given) else given
+        rows = symmetric("Division", name, value, 6, definite=name == "stiffness")
         return ca.SX(ca.vertcat(*(ca.horzcat(*row) for row in rows)))
 
     def _check_rank(self) -> None:

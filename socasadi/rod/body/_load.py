@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from .._checks import Number, finite, matrix, not_negative, numbers, positive
+from .._checks import Number, finite, flag, not_negative, numbers, positive_number, symmetric
 
 _ZERO = (0.0, 0.0, 0.0)
 
@@ -44,7 +44,8 @@ class Payload:
     def __post_init__(self) -> None:
         not_negative("Payload", mass=self.mass)
         _check_place("Payload", self.s)
-        object.__setattr__(self, "inertia", matrix("Payload", "inertia", self.inertia, 3))
+        inertia = symmetric("Payload", "inertia", self.inertia, 3, definite=False)
+        object.__setattr__(self, "inertia", inertia)
         object.__setattr__(self, "offset", numbers("Payload", "offset", self.offset, 3))
 
 
@@ -81,6 +82,7 @@ class PointLoad:
     def __post_init__(self) -> None:
         object.__setattr__(self, "force", numbers("PointLoad", "force", self.force, 3))
         object.__setattr__(self, "moment", numbers("PointLoad", "moment", self.moment, 3))
+        flag("PointLoad", follower=self.follower)
         _check_place("PointLoad", self.s)
 
 
@@ -120,13 +122,18 @@ class DistributedLoad:
             if not callable(given := getattr(self, name)):
                 object.__setattr__(self, name, numbers("DistributedLoad", name, given, 3))
         check_span("DistributedLoad", self.start, self.end)
+        flag("DistributedLoad", follower=self.follower)
 
     def at(self, s: float) -> tuple[Any, ...]:
         """Moment and force per metre (6,) at ``s``."""
         both = []
         for name in ("moment", "force"):
             given = getattr(self, name)
-            both += numbers("DistributedLoad", f"{name}({s:g})", given(s) if callable(given) else given, 3)
+            try:
+                value = given(s) if callable(given) else given
+            except Exception as error:
+                raise ValueError(f"DistributedLoad: {name} fails at s = {s:g} m: {error}") from error
+            both += numbers("DistributedLoad", f"{name}({s:g})", value, 3)
         return tuple(both)
 
 
@@ -185,4 +192,4 @@ def check_span(owner: str, start: Any, end: Any) -> None:
 
 def _check_place(owner: str, s: Any) -> None:
     if s is not None:
-        positive(owner, s=s)
+        positive_number(owner, s=s)

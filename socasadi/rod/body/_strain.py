@@ -15,6 +15,8 @@ from ._basis import Basis, Legendre
 STRAINS = ("torsion", "bending_y", "bending_z", "stretch", "shear_y", "shear_z")
 """The six strains (kx, ky, kz, sx, sy, sz), in the order in which coordinates and twists hold them."""
 
+_PARTS = ("size", "degree", "breaks", "values")  # of a basis
+
 
 @dataclass(frozen=True)
 class Strain:
@@ -63,7 +65,7 @@ class Strain:
                 object.__setattr__(self, name, basis.order)
             elif isinstance(basis, Integral) and not isinstance(basis, bool) and int(basis) >= 0:
                 object.__setattr__(self, name, int(basis))
-            elif basis is not None and not all(hasattr(basis, part) for part in ("size", "degree", "breaks", "values")):
+            elif basis is not None and (isinstance(basis, type) or not all(hasattr(basis, part) for part in _PARTS)):
                 raise ValueError(
                     f"Strain: {name} is {basis!r}, but must be None, a polynomial order 0, 1, 2, ... or a basis"
                 )
@@ -121,8 +123,8 @@ class Strain:
             return ca.SX(ca.vertcat(*self.rest))
         try:
             return ca.SX(ca.vertcat(*numbers("Strain", "rest(x)", self.rest(x), 6)))
-        except (TypeError, RuntimeError, NotImplementedError) as error:
-            raise ValueError(f"Strain: rest fails on a CasADi symbol: {error}") from error
+        except Exception as error:
+            raise ValueError(f"Strain: rest does not give six expressions for a CasADi symbol: {error}") from error
 
     @property
     def constant_rest(self) -> tuple[float, ...] | None:

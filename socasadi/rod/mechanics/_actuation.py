@@ -11,7 +11,7 @@ from ..body import Cable, Chamber
 from . import _kernels
 from ._mesh import Mesh
 from ._parameters import Parameters
-from ._routing import Span, route_at, spans_of
+from ._routing import Span, route_at, rubs, spans_of
 
 if TYPE_CHECKING:
     from .._rod import Rod
@@ -30,11 +30,11 @@ class Actuation:
         # Cables that share their nodes go through the kernels together.
         groups: dict[tuple[tuple[Span, ...], bool], list[int]] = {}
         for i, cable in enumerate(rod.cables):
-            groups.setdefault((spans_of(cable, self._mesh), _rubs(cable)), []).append(i)
+            groups.setdefault((spans_of(cable, self._mesh), rubs(cable)), []).append(i)
         columns: dict[int, ca.MX] = {}
         lengths: dict[int, ca.MX] = {}
-        for (spans, rubs), members in groups.items():
-            actuation, length = self._group(q, [rod.cables[i] for i in members], spans, rubs)
+        for (spans, rubbing), members in groups.items():
+            actuation, length = self._group(q, [rod.cables[i] for i in members], spans, rubbing)
             columns |= dict(zip(members, ca.horzsplit(actuation), strict=True))
             lengths |= dict(zip(members, ca.vertsplit(length), strict=True))
         actuation = ca.horzcat(ca.MX(rod.dof, 0), *(columns[i] for i in range(len(rod.cables))))
@@ -61,7 +61,7 @@ class Actuation:
         return any(cable.drive == "length" for cable in self._rod.cables)
 
     def _group(
-        self, q: ca.MX, cables: list[Cable | Chamber], spans: tuple[Span, ...], rubs: bool
+        self, q: ca.MX, cables: list[Cable | Chamber], spans: tuple[Span, ...], rubbing: bool
     ) -> tuple[ca.MX, ca.MX]:
         """Columns (n, cables) and lengths of cables that have the same nodes."""
         m, divisions = len(cables), self._rod.divisions
@@ -72,7 +72,7 @@ class Actuation:
             own = q[self._mesh.coordinates[span.division]]
             kernel = _kernels.cable_kernel(divisions[span.division].strain, m)
             remaining = [pulls] * len(span.nodes)
-            if rubs:
+            if rubbing:
                 factors, turned = self._capstan(own, cables, span, turned)
                 remaining = [pulls * factor for factor in factors]
             for (s, weight), pull in zip(span.nodes, remaining, strict=True):
@@ -111,10 +111,6 @@ class Actuation:
         basis, basis_rate = (ca.DM(strain.sparsity, ca.evalf(value)) for value in here[:2])
         given = ca.DM(0, 1) if strain.constant_rest is not None else self._parameters.lift(here[2])
         return basis, basis_rate, given, self._parameters.lift(here[3])
-
-
-def _rubs(cable: Cable | Chamber) -> bool:
-    return not (isinstance(cable.friction, float | int) and cable.friction == 0)
 
 
 def _running_integrals(points: int) -> np.ndarray:

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 from scipy.linalg import eigh, expm
 
-from .._checks import positive
+from .._checks import positive_number
 from ._model import TIP_LOADS
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def linearise(
     x, u, tip = ca.MX.sym("x", 2 * n), ca.MX.sym("u", m), ca.MX.sym("tip", TIP_LOADS)
     if output is None:
         y = (ca.DM(rod.base_rotation).T @ rod.tip(x[:n]))[1:]
-    elif output.n_in() == 1 and output.size_in(0) == (2 * n, 1):
+    elif isinstance(output, ca.Function) and output.n_in() == 1 and output.size_in(0) == (2 * n, 1):
         y = output(x)
     else:
         raise ValueError(f"Rod.linearise: output is {output}, but must be a CasADi Function of the state x ({2 * n},)")
@@ -77,7 +77,7 @@ def linearise(
     evaluate = ca.Function("linear", [x, u, tip], jacobians)
     A, B, C = (value.full() for value in evaluate(equilibrium.state, equilibrium.input, equilibrium.tip_load))
     if sample_time is not None:
-        positive("Rod.linearise", sample_time=sample_time)
+        positive_number("Rod.linearise", sample_time=sample_time)
         both = expm(sample_time * np.block([[A, B], [np.zeros((m, 2 * n + m))]]))
         A, B = both[: 2 * n, : 2 * n], both[: 2 * n, 2 * n :]
     return Linearisation(A, B, C, np.zeros((C.shape[0], m)), sample_time, equilibrium)

@@ -10,13 +10,12 @@ import numpy as np
 
 from .._checks import Number
 from .._quadrature import gauss_legendre
+from .._validation import PLACE_TOLERANCE
 from ..body import DistributedLoad, Payload, PointLoad
 from ._kernels import GAUSS_POINTS
 
 if TYPE_CHECKING:
     from .._rod import Rod
-
-_SAME_PLACE = 1e-12  # of the length
 
 
 @dataclass(frozen=True)
@@ -71,17 +70,15 @@ class Mesh:
         pieces = []
         for index, ((start, end), division) in enumerate(zip(self.spans, rod.divisions, strict=True)):
             breaks = [start + x * division.length for x in division.strain.breaks]
-            inner = [s for s in (*breaks, *cuts) if s is not None and start < s < end]
+            inner = [s for s in (*breaks, *cuts) if s is not None and start < s < end and not self.same_place(s, end)]
             for a, b in pairwise(self._distinct([start, *inner, end])):
                 pieces.append(Piece(index, a, b, division.points_in((b - a) / division.length)))
         return pieces
 
     @cached_property
     def nodes(self) -> list[Node]:
-        rod = self._rod
-        nodes: list[Node] = []
-        carried = [body.s for body in (*rod.payloads, *rod.loads) if not isinstance(body, DistributedLoad)]
-        marks = [rod.length if s is None else s for s in carried]
+        rod, nodes = self._rod, list[Node]()
+        marks = [self._mark(body) for body in (*rod.payloads, *rod.loads) if not isinstance(body, DistributedLoad)]
         for piece in self.pieces:
             x, w = gauss_legendre(piece.points)
             stops = [(s, weight) for s, weight in zip(piece.a + piece.length * x, piece.length * w, strict=True)]
@@ -106,7 +103,7 @@ class Mesh:
         here = [
             body
             for body in (*rod.payloads, *rod.loads)
-            if not isinstance(body, DistributedLoad) and self.same_place(rod.length if body.s is None else body.s, stop)
+            if not isinstance(body, DistributedLoad) and self.same_place(self._mark(body), stop)
         ]
         return Node(
             piece.division,
@@ -120,9 +117,14 @@ class Mesh:
             tuple(body for body in here if isinstance(body, PointLoad)),
         )
 
+    def _mark(self, body: Payload | PointLoad) -> float:
+        """Where something sits; at a piece's end if rounding alone keeps it from there."""
+        s = self._rod.length if body.s is None else body.s
+        return next((piece.b for piece in self.pieces if self.same_place(piece.b, s)), s)
+
     def same_place(self, s: float, other: float) -> bool:
         """Whether two arc lengths differ by rounding alone."""
-        return abs(s - other) <= _SAME_PLACE * self._rod.length
+        return abs(s - other) <= PLACE_TOLERANCE * self._rod.length
 
     def _distinct(self, places: list[float]) -> list[float]:
         """``places`` in order, those that rounding alone tells apart taken as one."""

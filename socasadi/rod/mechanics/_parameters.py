@@ -16,22 +16,18 @@ class Parameters:
     symbols
         Column of the symbols that the rod was written with.
     free
-        The last argument of every Function, (p,); empty where there are no parameters or all have values.
+        The last argument of every Function, (p,); empty for a rod of numbers.
     values
-        What stands for the symbols: numbers, or that argument.
+        What stands for the symbols: that argument, or nothing.
     """
 
     def __init__(self, rod: Rod) -> None:
         self.symbols = ca.vertcat(ca.SX(0, 1), *rod.parameters)
-        given = rod.parameter_values
-        self.free: tuple[ca.MX, ...] = ()
-        self.values: Any = ca.DM(0, 1) if given is None else ca.DM(given)
-        if rod.parameters and given is None:
-            self.free = (ca.MX.sym("p", self.symbols.numel()),)
-            self.values = self.free[0]
+        self.free = (ca.MX.sym("p", self.symbols.numel()),) if rod.parameters else ()
+        self.values: ca.MX | ca.DM = self.free[0] if self.free else ca.DM(0, 1)
 
     def lift(self, value: Any) -> Any:
-        """A number or an array of numbers as DM; an expression of the symbols as what their values make of it."""
+        """A number or an array of numbers as DM; an expression of the symbols as one of the argument p, MX."""
         value = ca.SX(value)
         if not ca.symvar(value):
             return ca.evalf(value)

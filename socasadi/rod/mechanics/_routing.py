@@ -11,6 +11,7 @@ from ._mesh import Mesh
 
 _TOLERANCE = 1e-10
 _MOST_POINTS = 64
+_RUBBING_POINTS = 6  # friction varies along a cable even where its route and the strain do not
 
 
 @dataclass(frozen=True)
@@ -33,8 +34,14 @@ def spans_of(cable: Cable | Chamber, mesh: Mesh) -> tuple[Span, ...]:
     for piece in mesh.pieces:
         a, b = max(piece.a, cable.start), min(piece.b, end)
         if a < b and not mesh.same_place(a, b):
-            spans.append(Span(piece.division, a, b, _converged(cable, a, b, piece.points)))
+            fewest = max(piece.points, _RUBBING_POINTS) if rubs(cable) else piece.points
+            spans.append(Span(piece.division, a, b, _converged(cable, a, b, fewest)))
     return tuple(spans)
+
+
+def rubs(cable: Cable | Chamber) -> bool:
+    """Whether there is friction along the cable."""
+    return not (isinstance(cable.friction, float | int) and cable.friction == 0)
 
 
 def route_at(cable: Cable | Chamber, s: float) -> list[ca.SX]:

@@ -19,10 +19,10 @@ Why not CasADi's own linearly implicit integrator: for the preset "paper" (8 coo
 studies/speed_integrators.py gave, on one core of a small server, for the tip error at 1 s and the time of one compiled
 sample of 50 ms:
 
-    this method, substeps of 10 / 5 / 2.5 ms      7.2 / 1.8 / 0.45 um     37 / 72 / 148 us       1 s to compile
-    "rosenbrock", one step of 50 ms               1.4 um                  346 us                 42 s to compile
+    this method, substeps of 10 / 5 / 2.5 ms      7.2 / 1.8 / 0.45 um     26 / 51 / 98 us        0.8 s to compile
+    "rosenbrock", one step of 50 ms               1.4 um                  179 us                 33 s to compile
 
-Four to five times quicker at like accuracy, and compiled in a fortieth of the time.
+Three to four times quicker at like accuracy, and compiled in a fortieth of the time.
 
 The default substep, 1/250 of the period of the slowest mode of the straight rod, is 5 ms there. It follows the rod's
 stiffness and mass: a rod that vibrates faster gets shorter substeps, for accuracy; the stiff strains (stretch,
@@ -37,7 +37,7 @@ from typing import TYPE_CHECKING, Literal
 import casadi as ca
 import numpy as np
 
-from .._checks import positive
+from .._checks import positive_number
 from ._linear import modes
 from ._model import RodModel, dead_force
 
@@ -53,7 +53,7 @@ def substeps(rod: Rod, sample_time: float, substep: float | None) -> int:
     if substep is None:
         slowest = modes(rod, rod.stiffness.full(), np.zeros(rod.dof)).frequency[0]
         substep = 1 / (_SUBSTEPS_PER_PERIOD * float(slowest))
-    positive("Rod.step", sample_time=sample_time, substep=substep)
+    positive_number("Rod.step", sample_time=sample_time, substep=substep)
     return max(1, ceil(sample_time / substep * (1 - 1e-12)))
 
 
