@@ -99,14 +99,14 @@ def beside_peers(with_peers: bool) -> None:
         print(
             f"\n{kind.name:75} {'dof':>4} {'error / mm':>10} {'x real time':>11} {'x our time':>10} {'setup / s':>9} {'MB':>5}"
         )
-        converged, walls = measured(ours, **kind.converged), []
-        for settings in kind.ours:
-            run = measured(ours, **settings)
-            walls += [run.wall] if isinstance(run, Run) else []
-            show(run, converged, min(walls))
+        converged = measured(ours, **kind.converged)
+        runs = [measured(ours, **settings) for settings in kind.ours]
+        fastest = min(run.wall for run in runs if isinstance(run, Run))
+        for run in runs:
+            show(run, converged, fastest)
         for peer, settings, finest in kind.peers if with_peers else []:
             run = measured(peer, **settings)
-            show(run, measured(peer, **settings | finest) if finest else converged, min(walls))
+            show(run, measured(peer, **settings | finest) if finest else converged, fastest)
 
 
 def show(run: Run | Absent, converged: Run | Absent, fastest: float) -> None:
@@ -114,12 +114,11 @@ def show(run: Run | Absent, converged: Run | Absent, fastest: float) -> None:
         if isinstance(absent, Absent):
             print(f"{absent.name}: {absent.reason}")
             return
-    error = 1e3 * np.linalg.norm(run.tip - converged.tip, axis=1).max()  # type: ignore[union-attr]
-    print(
-        f"{run.name:75} {run.dof:4} {error:10.3f} {DURATION / run.wall:11.0f} {run.wall / fastest:10.1f} "  # type: ignore[union-attr]
-        f"{run.setup:9.2f} {run.memory:5.0f}",  # type: ignore[union-attr]
-        flush=True,
-    )
+    assert isinstance(run, Run)
+    assert isinstance(converged, Run)
+    error = 1e3 * np.linalg.norm(run.tip - converged.tip, axis=1).max()
+    speed = f"{DURATION / run.wall:11.0f} {run.wall / fastest:10.1f}"
+    print(f"{run.name:75} {run.dof:4} {error:10.3f} {speed} {run.setup:9.2f} {run.memory:5.0f}", flush=True)
 
 
 def legendre(dof: int) -> dict[str, Any]:
@@ -175,7 +174,7 @@ def build(dof: int, points: int) -> Run:
 
 
 def building() -> None:
-    print("\nfrom Rod(...) to a compiled step, s (peak memory of the process without the compiler's, MB):")
+    print("\nfrom Rod(...) to a compiled step, s (peak memory, the compiler's included, MB):")
     for dof, points in ((10, 10), (24, 16), (40, 24)):
         with tempfile.TemporaryDirectory() as cache:
             os.environ["SOCASADI_CACHE"] = cache
@@ -187,9 +186,10 @@ def building() -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description="How fast the rod is.")
     parser.add_argument("--no-peers", action="store_true", help="leave out Exudyn, PyElastica and SoRoMoX")
-    beside_peers(not parser.parse_args().no_peers)
+    with_peers = not parser.parse_args().no_peers
     with tempfile.TemporaryDirectory() as cache:
         os.environ["SOCASADI_CACHE"] = cache
+        beside_peers(with_peers)
         growth(Path(__file__).parent / "figures")
     building()
 

@@ -28,7 +28,8 @@ class Run:
     """One simulation of the step couple: `tip` (k, 3) in m at `times` (k,) in s, `wall` and `setup` in s of wall time.
 
     `wall` is the best of a few repetitions of the simulation alone, `setup` building the model and compiling it;
-    `memory` is the peak of the process in MB, known only through `measured`.
+    `memory` is the peak of the process and of the largest that it started (a compiler, say) in MB, known only through
+    `measured`.
     """
 
     name: str
@@ -63,7 +64,8 @@ def _alone(peer: Callable[..., Run], settings: dict[str, Any]) -> Run | Absent:
         return Absent(peer.__name__, f"not installed ({missing.name} is missing): pip install socasadi[peers]")
     except Exception as error:  # their exceptions do not always survive the way between processes
         return Absent(peer.__name__, f"failed with {settings}: {type(error).__name__}: {str(error)[:200]}")
-    return replace(run, memory=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    peaks = [resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return replace(run, memory=sum(peaks) / 1024)
 
 
 def steps_a_sample(step: float) -> int:
