@@ -96,9 +96,8 @@ def ours(strain: dict[str, Any], points: int, step: float) -> Run:
 
 def beside_peers(with_peers: bool) -> None:
     for kind in KINDS:
-        print(
-            f"\n{kind.name:75} {'dof':>4} {'error / mm':>10} {'x real time':>11} {'x our time':>10} {'setup / s':>9} {'MB':>5}"
-        )
+        head = f"{'dof':>4} {'error / mm':>10} {'x real time':>11} {'x our time':>10} {'setup / s':>9} {'MB':>5}"
+        print(f"\n{kind.name:75} {head}")
         converged = measured(ours, **kind.converged)
         runs = [measured(ours, **settings) for settings in kind.ours]
         fastest = min(run.wall for run in runs if isinstance(run, Run))
