@@ -173,8 +173,10 @@ class UserBasis:
     breaks: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        functions = (self.functions,) if callable(self.functions) else tuple(self.functions)
-        object.__setattr__(self, "functions", functions)
+        functions = [self.functions] if callable(self.functions) else self.functions
+        if not isinstance(functions, list | tuple) or not all(map(callable, functions)):
+            raise TypeError(f"UserBasis: functions is {self.functions!r}, but must hold functions of x")
+        object.__setattr__(self, "functions", tuple(functions))
         object.__setattr__(self, "degree", whole("UserBasis", "degree", self.degree, 0))
         object.__setattr__(self, "breaks", _increasing("UserBasis", "breaks", self.breaks))
         if not self.functions:
