@@ -92,15 +92,18 @@ def test_an_upright_rod_buckles_at_greenhills_weight():
     """w L^3 / EI = 7.8373 (Greenhill 1881): where the smallest eigenvalue of the tangent stiffness vanishes."""
 
     def stability(weight):
-        return beam(6, 24, gravity=(-weight / 1e6, 0, 0)).equilibrium().stability
+        rod = slender(Strain(bending_z=6), quadrature_points=24, gravity=(-weight / 1e6, 0, 0))
+        return rod.equilibrium().stability
 
     assert stability(0.0) == pytest.approx(1, abs=1e-12)
     assert brentq(stability, 7, 9, xtol=1e-6) == pytest.approx(7.83735, rel=2e-6)
 
 
 def test_a_compressed_cantilever_buckles_at_eulers_load():
+    rod = slender(Strain(bending_z=6), quadrature_points=24)
+
     def stability(load):
-        return beam(6, 24).equilibrium(tip_force=(-load, 0, 0)).stability
+        return rod.equilibrium(tip_force=(-load, 0, 0)).stability
 
     assert brentq(stability, 2, 3, xtol=1e-8) == pytest.approx(pi**2 / 4, rel=1e-6)
 
