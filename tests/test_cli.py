@@ -161,8 +161,11 @@ def test_a_run_folder_that_exists_needs_resume_and_the_same_settings(finished):
     assert "other settings: seed was 0 and is 5" in other.stderr
 
 
-def test_the_readmes_ten_lines_run(tmp_path):
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+def test_what_the_readme_shows_of_python_runs(tmp_path):
+    code, rod = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+    run = subprocess.run([sys.executable, "-c", rod], cwd=tmp_path, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert "casadi_real" in (tmp_path / "rhs.c").read_text()
     short = code.replace("iterations=20", "iterations=1, seed_points=2")
     assert short != code
     run = subprocess.run([sys.executable, "-c", short], cwd=tmp_path, capture_output=True, text=True)

@@ -308,8 +308,9 @@ class Rod:
     ) -> mechanics.Equilibrium:
         """Static equilibrium under constant loads, reached by increasing them together from zero.
 
-        A rod that buckles on the way follows the branch that an imperfection (a small side load, a rest curvature)
-        points to. Without any it may stay on the straight one: the equilibrium's ``stability`` tells.
+        A rod that buckles on the way follows the branch that an imperfection points to: a side load of some 1e-4 of
+        what makes it buckle, or a rest curvature. A perfect one stays on the straight branch, and the equilibrium's
+        ``stability`` is below zero.
 
         Parameters
         ----------

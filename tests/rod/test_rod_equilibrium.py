@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rod_support import coordinates, derivative, rich_rod, slender, values
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
+from scipy.special import ellipk
 
-from socasadi.rod import BSpline, Equilibrium, EquilibriumError, PointLoad, Rod, Strain
+from socasadi.rod import BSpline, Equilibrium, EquilibriumError, Material, PointLoad, Rod, Section, Strain
 
 PAPER = Rod.preset("paper")
 RICH = rich_rod()
@@ -191,3 +193,20 @@ def test_the_static_residual_is_the_derivative_of_an_energy_without_followers_an
     tip_load = np.concatenate([np.zeros(3), force, np.zeros(6)])
     numeric = derivative(potential, q)
     assert np.allclose(residual(rod, q, given, tip_load), numeric, rtol=0, atol=1e-8 * np.abs(numeric).max())
+
+
+@pytest.mark.parametrize("part", [1.02, 1.1, 1.5, 4.0])
+@pytest.mark.parametrize("imperfection", [1e-2, 1e-3, 1e-4])
+def test_a_column_buckles_to_the_side_to_which_it_is_pushed(part, imperfection):
+    """Euler's column beyond pi^2 EI / (4 L^2); the tip is where the elastica of Timoshenko and Gere has it."""
+    rod = Rod(0.6, Section.circle(0.02), Material(1e6, 0.5, 1000), Strain(bending_z=6))
+    P = part * np.pi**2 / 4 * 1e6 * rod.divisions[0].section.Iz / 0.6**2
+    bent = rod.equilibrium(tip_force=(-P, imperfection * P, 0))
+    assert bent.stability > 0
+    # tip angle alpha: sqrt(part) = 2 K(sin(alpha/2)) / pi, and deflection 4 sin(alpha/2) / (pi sqrt(part)) of L
+    modulus = brentq(lambda k: 2 / np.pi * ellipk(k**2) - np.sqrt(part), 1e-9, 1 - 1e-12)
+    perfect = 4 * modulus / (np.pi * np.sqrt(part)) * 0.6
+    assert bent.tip[1] == pytest.approx(perfect, rel=1e-3 + 1.5 * imperfection / (part - 1))
+    straight = rod.equilibrium(tip_force=(-P, 0, 0))
+    assert np.allclose(straight.tip, [0.6, 0, 0], atol=1e-12)
+    assert straight.stability == pytest.approx(1 - part, rel=1e-4, abs=1e-5)

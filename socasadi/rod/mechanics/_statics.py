@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
+from scipy.linalg import eigh
 
 from ._elasticity import spin_gram
 from ._model import TIP_LOADS
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 _ITERATIONS = 25
 _SMALLEST_LOAD_STEP = 1 / 8192
 _LARGEST_STEP = 0.3  # rad of section rotation that one load step may add: longer ones lose the branch at a bifurcation
+_AS_WEAK = 0.05  # relative stiffness by which directions of buckling are told from others
+_NO_SIDE = 1e-12
 _LOOKED_AT = 33  # places along the rod whose stretch is looked at
 _LARGEST_TURN = 0.7  # rad of section rotation that one Newton step may add before it is shortened
 
@@ -171,19 +174,22 @@ class Statics:
         residual, tangent = (value.full() for value in newton(y, *loads, 0.0))
         pull = newton(y, *loads, 1.0)[0].full() - residual
         linear = np.linalg.lstsq(tangent, -pull[:, 0], rcond=None)[0]
-        step, stable = 1 / max(1, ceil(self._turn(linear) / _LARGEST_STEP)), True
+        step, stable, increment = 1 / max(1, ceil(self._turn(linear) / _LARGEST_STEP)), True, linear
         while done < 1:
             target = min(1.0, done + step)
             reached = self._converge(newton, y, loads, target)
-            if reached is not None:
-                still_stable = stable and self._stable(newton, reached, loads, target)
-                followed = still_stable == stable and self._turn(reached - y) <= _LARGEST_STEP
-                if followed or step <= _SMALLEST_LOAD_STEP:
-                    y, done, step, stable = reached, target, 1.5 * step, still_stable
-                    continue
-            if step <= _SMALLEST_LOAD_STEP:
+            still_stable = stable and reached is not None and self._stable(newton, reached, loads, target)
+            followed = reached is not None and still_stable == stable and self._turn(reached - y) <= _LARGEST_STEP
+            if not followed and step > _SMALLEST_LOAD_STEP:
+                step /= 2
+                continue
+            aside = self._branch(newton, y, increment, loads, done) if stable and not followed else None
+            if aside is not None:
+                (reached, target), still_stable = aside, True
+            if reached is None:
                 raise EquilibriumError(self._failure(loads, done))
-            step /= 2
+            increment = reached - y
+            y, done, step, stable = reached, target, 1.5 * step, still_stable
         return y
 
     def _stable(self, newton: ca.Function, y: np.ndarray, loads: tuple[np.ndarray, ...], fraction: float) -> bool:
@@ -192,6 +198,32 @@ class Statics:
             return True
         tangent = newton(y, *loads, fraction)[1].full()
         return bool(np.linalg.eigvalsh((tangent + tangent.T) / 2)[0] > 0)
+
+    def _branch(
+        self, newton: ca.Function, y: np.ndarray, increment: np.ndarray, loads: tuple[np.ndarray, ...], done: float
+    ) -> tuple[np.ndarray, float] | None:
+        """A stable equilibrium on the branch that leaves a bifurcation just beyond y, and its part of the loads.
+
+        On the side to which the last increment points; None where it points to none, as for a perfect column.
+        """
+        tangent, stiffness = newton(y, *loads, done)[1].full(), self._rod.stiffness.full()
+        softness, shapes = eigh((tangent + tangent.T) / 2, stiffness)
+        weak = shapes[:, softness < softness[0] + _AS_WEAK]
+        direction = weak @ (weak.T @ stiffness @ increment)
+        if np.linalg.norm(direction) <= _NO_SIDE * np.linalg.norm(increment):
+            return None
+        direction /= self._turn(direction)
+        for ahead in (1 / 256, 1 / 64, 1 / 16):
+            target = min(1.0, done + ahead)
+            for turn in (0.1, 0.3, 1.0):
+                reached = self._converge(newton, y + turn * direction, loads, target)
+                if (
+                    reached is not None
+                    and self._stable(newton, reached, loads, target)
+                    and direction @ stiffness @ (reached - y) > 0
+                ):
+                    return reached, target
+        return None
 
     def _failure(self, loads: tuple[np.ndarray, ...], done: float) -> str:
         given, tip = (np.round(load, 9).tolist() for load in loads)
