@@ -10,7 +10,7 @@ from rod_support import slender
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from socasadi.rod import Division, Material, Payload, Rod, Section, Strain
+from socasadi.rod import Division, Drag, Material, Payload, Rod, Section, Strain
 
 PAPER = Rod.preset("paper")
 TIMOSHENKO = (0.7331, 4.4448, 11.863)  # Hz, no shear correction, with rotary inertia
@@ -121,3 +121,14 @@ def test_an_unstable_mode_has_frequency_zero():
     frequency = upright.modes().frequency
     assert frequency[0] == 0
     assert frequency[1] > 0
+
+
+def test_material_and_drag_damp_a_mode_as_textbooks_have_it():
+    """Kelvin-Voigt viscosity gives 3 eta omega / (2 E), drag proportional to the mass c / (2 rho A omega)."""
+    thin = Rod(1.0, Section.circle(1e-3), Material(1e6, 0.5, 1000.0, damping=20.0), Strain(bending_z=4))
+    modes = thin.modes()
+    omega = 2 * pi * modes.frequency[:2]
+    assert np.allclose(modes.damping_ratio[:2], 3 * 20.0 * omega / (2 * 1e6), rtol=1e-9)
+    wet = replace(thin, material=Material(1e6, 0.5, 1000.0), drag=Drag(linear=(0.0, 2e-4), quadratic=(0.0, 5.0)))
+    # rotary inertia, of which drag knows nothing, is (r / L)^2 of the rest
+    assert np.allclose(wet.modes().damping_ratio[:2], 2e-4 / (2 * 1000 * pi * 1e-6 * omega), rtol=1e-4)

@@ -51,7 +51,8 @@ class Modes:
     frequency
         Undamped natural frequencies (n,), Hz; 0 where the equilibrium is not stable.
     damping_ratio
-        (n,); above 1 the mode is overdamped. Modal damping: the coupling between modes is left out.
+        (n,), of the material and of linear drag; above 1 the mode is overdamped. Modal damping: the coupling between
+        modes is left out.
     shape
         (n, n) mode shapes in the strain coordinates, one a column, of unit modal mass.
     """
@@ -87,6 +88,8 @@ def modes(rod: Rod, tangent: np.ndarray, q: np.ndarray) -> Modes:
     """Modes of the conservative part of ``tangent`` stiffness with the mass matrix at ``q``."""
     squared, shape = eigh((tangent + tangent.T) / 2, rod.mass(q).full())
     omega = np.sqrt(np.maximum(squared, 0))
-    damping = np.einsum("ij,ik,kj->j", shape, rod.damping_matrix.full(), shape)
+    at_rest = np.concatenate([q, np.zeros_like(q)])
+    drag = ca.tril2symm(rod.model.motion(at_rest, np.zeros(len(rod.cables)))[3])
+    damping = np.einsum("ij,ik,kj->j", shape, (rod.damping_matrix + drag).full(), shape)
     with np.errstate(divide="ignore", invalid="ignore"):
         return Modes(omega / (2 * np.pi), damping / (2 * omega), shape)
