@@ -391,8 +391,9 @@ class Rod:
             s; tension (cables,) N and tip_force (3,) N, a dead force in the world frame, are held so long. Free
             parameters are a last argument p.
         substep
-            Longest substep of the integration, s. By default 1/250 of the period of the straight rod's slowest
-            mode: accuracy asks for that, stability does not.
+            Longest substep of the integration, s. By default 1/250 of the period of the straight rod's slowest mode or
+            1/40 of that of its fourth, whichever is shorter; a rod with parameters needs it given. Stiff strains ask
+            for no less, fast motion (a slender rod that whips through radians in a few ms) does.
 
         Notes
         -----

@@ -6,14 +6,16 @@ The method is the two-stage W-method ROS2 (Verwer, Spee, Blom, Hundsdorfer, SIAM
     (1 - gamma h A) k2 = f(x + h k1) - 2 k1
     x(t + h) = x + h (3 k1 + k2) / 2,
 
-of order two for any matrix A, and L-stable when A is the Jacobian of f. With
+of order two for any matrix A, and L-stable when A is the Jacobian of f. Here
 
     A = [[0, 1], [-M(q)^-1 K(q), -M(q)^-1 D(q)]]
 
-(M the mass matrix at the beginning of the substep, which the first stage has at hand; K the constant elastic matrix and
-what taut cables of given length add, D the constant viscous one and what drag adds) A holds all that is stiff in a rod,
-and eliminating the first block leaves one symmetric system with M + gamma h D + (gamma h)^2 K per stage: no Jacobian,
-no iteration.
+holds all that is stiff in a rod: K is the constant elastic matrix and what taut cables of given length add, D the
+constant viscous one and what drag adds, M the mass matrix. Each stage takes A where it evaluates f, which leaves the
+order at two (A differs by O(h) between the stages, the result by O(h^3)), and multiplies by M: one symmetric system
+with M + gamma h D + (gamma h)^2 K a stage, no Jacobian, no iteration. With the first stage's A in both, the second
+would have M(q1) M(q2)^-1 before its stiff forces, and slender rods, whose inertia in torsion changes a hundredfold as
+they bend, would blow up at moderate steps.
 
 Why not CasADi's own linearly implicit integrator: for the preset "paper" (8 coordinates) after a step of 5 N,
 studies/speed_integrators.py gave, on one core of a small server, for the tip error at 1 s and the time of one compiled
@@ -24,9 +26,9 @@ sample of 50 ms:
 
 Three to four times quicker at like accuracy, and compiled in a fortieth of the time.
 
-The default substep, 1/250 of the period of the slowest mode of the straight rod, is 5 ms there. It follows the rod's
-stiffness and mass: a rod that vibrates faster gets shorter substeps, for accuracy; the stiff strains (stretch,
-torsion, high orders) do not enter it, because the method is stable for them.
+The default substep is 1/250 of the period of the slowest mode of the straight rod or 1/40 of that of the fourth slowest
+(the second of both bending axes), whichever is shorter: 5 ms there. It follows the rod's stiffness and mass: a rod that
+vibrates faster gets shorter substeps, for accuracy; the stiffer strains do not enter it.
 """
 
 from __future__ import annotations
@@ -44,15 +46,15 @@ from ._model import RodModel, dead_force
 if TYPE_CHECKING:
     from .._rod import Rod
 
-_SUBSTEPS_PER_PERIOD = 250  # of the slowest mode of the straight rod, by default
+_SUBSTEPS = {0: 250, 3: 40}  # in a period of the slowest mode of the straight rod, and of the fourth, by default
 _GAMMA = 1 - 1 / sqrt(2)
 
 
 def substeps(rod: Rod, sample_time: float, substep: float | None) -> int:
-    """How many equal substeps, none longer than ``substep``, make a sample; by default it follows the slowest mode."""
+    """How many equal substeps, none longer than ``substep``, make a sample; by default it follows the slow modes."""
     if substep is None:
-        slowest = modes(rod, rod.stiffness.full(), np.zeros(rod.dof)).frequency[0]
-        substep = 1 / (_SUBSTEPS_PER_PERIOD * float(slowest))
+        frequency = modes(rod, rod.stiffness.full(), np.zeros(rod.dof)).frequency
+        substep = min(1 / (count * float(frequency[i])) for i, count in _SUBSTEPS.items() if i < rod.dof)
     positive_number("Rod.step", sample_time=sample_time, substep=substep)
     return max(1, ceil(sample_time / substep * (1 - 1e-12)))
 
@@ -65,21 +67,18 @@ def w_method(model: RodModel, sample_time: float, count: int) -> ca.Function:
     shift = ca.tril(ca.densify(g * D + g**2 * K))
 
     tip = dead_force(tip_force)
-    mass, force, spring, drag = model.loaded_motion(x, u, tip, *model.free)
-    shifted = mass + shift + g**2 * spring + g * drag
-    K = K + ca.tril2symm(spring)
 
-    def solve(r1: ca.MX, r2: ca.MX) -> tuple[ca.MX, ca.MX]:
-        """(1 - gamma h A)^-1 [r1; M^-1 r2]"""
-        b = model.solve(shifted, r2 - g * (K @ r1))
-        return r1 + g * b, b
+    def stage(x: ca.MX, before: ca.MX) -> ca.MX:
+        """(1 - gamma h A(x))^-1 (f(x) - before)"""
+        mass, force, spring, drag = model.loaded_motion(x, u, tip, *model.free)
+        r1 = x[n:] - before[:n]
+        r2 = force - ca.tril2symm(mass) @ before[n:] - g * (K @ r1 + ca.tril2symm(spring) @ r1)
+        b = model.solve(mass + shift + g**2 * spring + g * drag, r2)
+        return ca.vertcat(r1 + g * b, b)
 
-    a1, b1 = solve(x[n:], force)
-    later = x + h * ca.vertcat(a1, b1)
-    mass2, force2, *_ = model.loaded_motion(later, u, tip, *model.free)
-    acceleration = model.solve(mass2, force2) - 2 * b1
-    a2, b2 = solve(later[n:] - 2 * a1, ca.mtimes(ca.tril2symm(mass), acceleration))
-    advanced = x + h / 2 * ca.vertcat(3 * a1 + a2, 3 * b1 + b2)
+    first = stage(x, ca.MX(2 * n, 1))
+    second = stage(x + h * first, 2 * first)
+    advanced = x + h / 2 * (3 * first + second)
     once = ca.Function("substep", [x, u, tip_force, *model.free], [advanced])
 
     end = x
