@@ -1,9 +1,11 @@
 """Objects to plain data and back, so that a run folder says, and can rebuild, what was run."""
 
 import dataclasses
+import hashlib
 import importlib
 import inspect
 from collections.abc import Callable
+from types import CodeType, FunctionType
 from typing import Any
 
 import numpy as np
@@ -17,7 +19,7 @@ def describe(value: Any) -> Any:
     """``value`` as JSON data: numbers, text, lists, and for an object its type with what it was constructed from.
 
     An object is a dataclass, or one whose constructor arguments are attributes of the same names. A function is told
-    from others by its source, a symbolic expression by its text.
+    from others by its code and the values that it uses, a symbolic expression by its text.
     """
     match value:
         case None | bool() | int() | float() | str():
@@ -28,8 +30,8 @@ def describe(value: Any) -> Any:
             return [describe(item) for item in value]
         case dict():
             return {str(key): describe(item) for key, item in value.items()}
-    if inspect.isroutine(value):
-        return {"type": _public_name(value), "source": _source(value)}
+    if inspect.isfunction(value):
+        return {"type": _public_name(value), **_body(value)}
     if type(value).__str__ is not object.__str__:
         return {"type": _public_name(type(value)), "source": str(value)}
     if dataclasses.is_dataclass(value):
@@ -71,12 +73,17 @@ def differences(old: Any, new: Any, path: str = "") -> list[str]:
     return [] if old == new else [f"{path} was {old} and is {new}"]
 
 
-def _source(function: Callable[..., Any]) -> str:
-    try:
-        return inspect.getsource(function).strip()
-    except (OSError, TypeError):  # typed at a prompt, or not written in Python
-        code = getattr(function, "__code__", None)
-        return f"{code.co_code.hex()} {code.co_consts}" if code else function.__qualname__
+def _body(function: FunctionType) -> dict[str, Any]:
+    """What a function does: a digest of its code, and the numbers and texts around it that it uses."""
+    variables = inspect.getclosurevars(function)
+    uses = {**variables.globals, **variables.nonlocals}
+    plain = {name: value for name, value in uses.items() if isinstance(value, int | float | str | list | tuple)}
+    return {"code": hashlib.sha256(_code(function.__code__).encode()).hexdigest()[:16], "uses": describe(plain)}
+
+
+def _code(code: CodeType) -> str:
+    constants = [_code(item) if isinstance(item, CodeType) else repr(item) for item in code.co_consts]
+    return f"{code.co_code.hex()} {constants} {code.co_names}"
 
 
 def _public_name(kind: type | Callable[..., Any]) -> str:

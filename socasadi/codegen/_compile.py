@@ -68,7 +68,12 @@ def compiled(function: ca.Function, *, flags: Sequence[str] = ()) -> ca.Function
                 f"{' '.join(command)} failed on the C of {function.name()!r}:\n{run.stderr.strip()[:2000]}"
             )
 
-    return ca.external(function.name(), str(cached_file(name, build)))
+    library = cached_file(name, build)
+    try:
+        return ca.external(function.name(), str(library))
+    except RuntimeError:  # a damaged file: cut off by a full disk, say
+        library.unlink(missing_ok=True)
+        return ca.external(function.name(), str(cached_file(name, build)))
 
 
 def _c_source(function: ca.Function) -> str:

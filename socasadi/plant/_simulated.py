@@ -28,6 +28,8 @@ class SimulatedPlant:
         Standard deviation of the sensor's white Gaussian noise, in the output's unit (m; pixels for a camera).
     output
         What is measured: :class:`TipDisplacement`, :class:`LaserSpot` or :class:`Camera`.
+    substep
+        Longest substep of the rod's integration, s; None as in :meth:`Rod.step`.
 
     Raises
     ------
@@ -41,17 +43,21 @@ class SimulatedPlant:
         sample_time: float = 0.05,
         noise: float = 1e-3,
         output: Output = TipDisplacement(),  # noqa: B008 (frozen)
+        substep: float | None = None,
     ) -> None:
         for name, value in (("sample_time", sample_time), ("noise", noise)):
             if not (isinstance(value, SupportsFloat) and isfinite(value) and value >= 0):
                 raise ValueError(f"SimulatedPlant: {name} is {value!r}, but must be finite and not negative")
         if sample_time == 0:
             raise ValueError("SimulatedPlant: sample_time is 0 s, but must be above zero")
+        if substep is not None and not (isinstance(substep, SupportsFloat) and isfinite(substep) and substep > 0):
+            raise ValueError(f"SimulatedPlant: substep is {substep!r} s, but must be above zero, or None")
         output.check(rod.valued)
         self.rod = rod
         self.sample_time = float(sample_time)
         self.noise = float(noise)
         self.output = output
+        self.substep = substep
         self._random = np.random.default_rng()
         self._state: np.ndarray | None = None
         self._tension = np.zeros(self.inputs)
@@ -182,8 +188,11 @@ class SimulatedPlant:
 
     def _settle(self, state: np.ndarray, tip: np.ndarray, seen: np.ndarray) -> np.ndarray:
         self._state = None
-        if not np.isfinite(state).all():
-            raise PlantFailure(f"the state is not finite at {self.time:g} s")
+        if not (np.isfinite(state).all() and np.isfinite(tip).all()):
+            raise PlantFailure(
+                f"the state is not finite at {self.time:g} s: the integration of the rod diverged; "
+                "a shorter substep may follow so fast a motion"
+            )
         distance, length = float(np.linalg.norm(tip)), self.rod.length
         if not distance <= _FARTHEST * length:
             raise PlantFailure(
@@ -210,7 +219,7 @@ class SimulatedPlant:
     @cached_property
     def _advance(self) -> Buffered:
         """(x, tension, tip_force) -> (x, tip position, output) one sample later"""
-        step = self.rod.step_expression(self.sample_time)
+        step = self.rod.step_expression(self.sample_time, self.substep)
         arguments = step.mx_in()
         x_next = step(*arguments)
         return Buffered(compiled(ca.Function("plant_step", arguments, [x_next, *self._observe(x_next)])))

@@ -261,6 +261,8 @@ class Rod:
         ValueError
             There are not as many values as parameters, one is not finite, or one gives the rod what no rod can have.
         """
+        if not self.parameters:
+            raise ValueError("Rod.at: the rod has no parameters, so there is nothing to give values to")
         symbols = ca.vertcat(ca.SX(0, 1), *self.parameters)
         given = ca.DM(vector("Rod.at", "values", values, len(self.parameters)))
         parts: dict[str, Any] = {f.name: with_numbers(getattr(self, f.name), symbols, given) for f in fields(self)}
@@ -385,6 +387,8 @@ class Rod:
     def step(self, sample_time: float, substep: float | None = None) -> ca.Function:
         """CasADi Function (x, tension, tip_force) -> x one sample later, compiled when there is a C compiler.
 
+        For its C or its derivatives take :meth:`step_expression`, the same Function before compilation.
+
         Parameters
         ----------
         sample_time
@@ -405,7 +409,21 @@ class Rod:
         return self._steps[key]
 
     def step_expression(self, sample_time: float, substep: float | None = None) -> ca.Function:
-        """:meth:`step` before compilation, to be part of a larger Function or to be differentiated."""
+        """:meth:`step` before compilation: to be differentiated, generated as C, or part of a larger Function.
+
+        Examples
+        --------
+        How the tip after a sample of 50 ms depends on Young's modulus:
+
+        >>> E = ca.SX.sym("E")
+        >>> rubber = Material(E, 0.5, 1000, damping=1e4)
+        >>> rod = Rod(0.6, Section.circle(0.03), rubber, Strain(bending_z=1), Cable((0.02, 0)), parameters=E)
+        >>> advance, young = rod.step_expression(0.05, substep=0.005), ca.MX.sym("E")
+        >>> x = advance(np.zeros(4), [5.0], np.zeros(3), young)
+        >>> slope = ca.Function("slope", [young], [ca.jacobian(rod.tip(x[:2], young), young)])
+        >>> slope(1e6)[1] < 0
+        DM(1)
+        """
         if substep is None and self.parameters:
             raise ValueError(
                 "Rod.step: substep is not given, and its default follows from the values of the parameters; give it, s"

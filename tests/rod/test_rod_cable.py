@@ -13,6 +13,7 @@ from socasadi.rod import (
     Chamber,
     Converging,
     Division,
+    EquilibriumError,
     Helix,
     Rod,
     Strain,
@@ -281,3 +282,22 @@ def test_a_servo_and_a_tension_share_a_rod():
     assert np.allclose(
         B[mixed.dof :, 0], -1e4 * np.linalg.solve(values(mixed.mass, held.q), values(mixed.actuation, held.q)[:, 0])
     )
+
+
+@pytest.mark.parametrize(("count", "free"), [(3, {}), (4, {"stretch": 0}), (3, {"stretch": 0}), (5, {"stretch": 0})])
+def test_redundant_cables_take_the_lengths_of_an_arc_and_the_least_tensions(count, free):
+    """On an arc of curvature k a cable at offset d towards the centre is k d shorter per metre."""
+    rod = silicone_rod(Strain(bending_y=0, bending_z=0, **free), cables=cables_around(count, 0.02))
+    around = np.cos(2 * np.pi * np.arange(count) / count)
+    lengths = 0.6 * (1 - 2.0 * 0.02 * around)
+    bent = rod.equilibrium(lengths=lengths)
+    assert np.allclose(bent.lengths, lengths, atol=1e-12)
+    EI = 1e6 * np.pi * 0.03**4 / 4
+    # of all tensions with the moment EI k, those of least norm go with the cables' offsets
+    assert np.allclose(bent.tension, EI * 2.0 / 0.02 * around / (around @ around), atol=1e-6)
+
+
+def test_lengths_that_no_strain_allows_are_refused():
+    inextensible = silicone_rod(Strain(bending_y=0, bending_z=0), cables=cables_around(3, 0.02))
+    with pytest.raises(EquilibriumError, match=r"lengths \[0.61, 0.61, 0.6\] m together: .* 6.67 mm away"):
+        inextensible.equilibrium(lengths=[0.61, 0.61, 0.60])

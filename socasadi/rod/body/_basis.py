@@ -184,12 +184,13 @@ class UserBasis:
         x = ca.SX.sym("x")
         for i, function in enumerate(self.functions):
             try:
-                value = ca.SX(function(x))
-                right = value.is_scalar() and not [s for s in ca.symvar(value) if not ca.is_equal(s, x)]
+                given = function(x)
             except Exception as error:
                 raise ValueError(f"UserBasis: function {i} fails on a CasADi symbol: {error}") from error
+            value = ca.SX(given) if isinstance(given, float | int | ca.SX) else ca.SX(2, 1)
+            right = value.is_scalar() and not [s for s in ca.symvar(value) if not ca.is_equal(s, x)]
             if not right:
-                raise ValueError(f"UserBasis: function {i} gives {value}, but must give one expression of x alone")
+                raise ValueError(f"UserBasis: function {i} gives {given}, but must give one expression of x alone")
 
     @property
     def size(self) -> int:

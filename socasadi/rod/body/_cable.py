@@ -196,7 +196,8 @@ def cables_around(count: int, offset: Number) -> tuple[Cable, ...]:
 
 
 def _position(route: Route, s: Any) -> tuple[Any, Any]:
-    y, z = route(s) if callable(route) else route
+    place = route(s) if callable(route) else route
+    y, z = ca.vertsplit(place) if isinstance(place, ca.SX | ca.DM) else place
     return y, z
 
 
@@ -207,7 +208,7 @@ def _check_route(cable: Cable | Chamber, owner: str) -> None:
         return
     s = ca.SX.sym("s")
     try:
-        y, z = cable.route(s)
+        y, z = cable.at(s)
         finite(owner, y=ca.SX(y), z=ca.SX(z))
     except Exception as error:
         raise ValueError(

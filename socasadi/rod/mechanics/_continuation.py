@@ -13,6 +13,7 @@ _SMALLEST_STEP = 1 / 8192  # of the loads
 _LARGEST_STEP = 0.3  # rad of section rotation that one load step may add: longer ones lose the branch at a bifurcation
 _AS_WEAK = 0.05  # relative stiffness by which directions of buckling are told from others
 _NO_SIDE = 1e-12
+_REDUNDANT = 1e-11
 
 
 class Continuation:
@@ -28,7 +29,8 @@ class Continuation:
         Whether there is a rod in that state.
     stiffness
         Elastic stiffness: where the Jacobian is a tangent stiffness, an equilibrium that buckles leaves its branch on
-        the side to which an imperfection points. None where it is not.
+        the side to which an imperfection points. None where cables are held at their lengths: their tensions are
+        unknowns too, of which there may be more than the strains need.
     """
 
     def __init__(
@@ -70,9 +72,8 @@ class Continuation:
             residual, tangent = self._at(y, loads, part)
             if not (np.isfinite(residual).all() and np.isfinite(tangent).all()):
                 return None
-            try:
-                change = np.linalg.solve(tangent, -residual)
-            except np.linalg.LinAlgError:
+            change = self._change(residual, tangent)
+            if change is None:
                 return None
             y = y + change * min(1.0, _LARGEST_TURN / max(self._turn(change), 1e-300))
             size = np.linalg.norm(change) / (1 + np.linalg.norm(y))
@@ -80,6 +81,15 @@ class Continuation:
                 return y if self._possible(y) else None
             previous = size
         return None
+
+    def _change(self, residual: np.ndarray, tangent: np.ndarray) -> np.ndarray | None:
+        """Newton's step; the least of many where tensions can be chosen."""
+        try:
+            if self._stiffness is None:
+                return np.linalg.lstsq(tangent, -residual, rcond=_REDUNDANT)[0]
+            return np.linalg.solve(tangent, -residual)
+        except np.linalg.LinAlgError:
+            return None
 
     def tangent(self, y: np.ndarray, loads: tuple[np.ndarray, ...], part: float = 1.0) -> np.ndarray:
         """Jacobian of the residual under a part of the loads."""

@@ -14,6 +14,7 @@ from ._model import TIP_LOADS
 if TYPE_CHECKING:
     from .._rod import Rod
 
+_MISSED = 1e-9  # of the rod's length
 _LOOKED_AT = 33  # places along the rod whose stretch is looked at
 
 
@@ -145,6 +146,14 @@ class Statics:
         """Equilibrium with cables of exactly these lengths (cables,), by whatever tensions that takes."""
         n = self._rod.dof
         both = self._followed(self._held, (lengths, tip_load))
+        reached = self._rod.model.cable_lengths(both[:n]).full()[:, 0]
+        missed = float(np.abs(reached - lengths).max(initial=0.0))
+        if missed > _MISSED * self._rod.length:
+            raise EquilibriumError(
+                f"no tensions give the cables the lengths {lengths.tolist()} m together: the strains of the rod allow "
+                f"{reached.round(6).tolist()} m at the nearest, {1e3 * missed:.3g} mm away; "
+                "a free stretch or a cable less may allow them"
+            )
         return self._at(both[:n], np.where(self._by_length, lengths, both[n:]), both[n:], tip_load)
 
     def tangent(self, equilibrium: Equilibrium) -> np.ndarray:
