@@ -401,7 +401,12 @@ class Rod:
 
         Notes
         -----
-        A two-stage linearly implicit method of order two, L-stable for the rod's elasticity and damping.
+        A two-stage linearly implicit method of order two, L-stable for the rod's elasticity and damping. To judge an
+        answer, halve the substep, raise the strains' orders and the quadrature points until it stays.
+
+        The method takes a little energy: over tens of periods an undamped rod needs shorter substeps. Thrown through
+        several radians without any damping it may diverge (the state is then not finite) where 2 % of damping in the
+        first mode are enough; :meth:`reference_step` copes with it.
         """
         key = (sample_time, substep)
         if key not in self._steps:

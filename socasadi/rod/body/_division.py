@@ -41,8 +41,8 @@ class Division:
         symmetric positive semidefinite.
     quadrature_points
         Gauss-Legendre points in each piece of the division (it has one, unless a strain or a load has a break
-        inside). None takes six points in one piece, more where the strain's degree asks for it: some 1e-5 of the
-        length in a tip deflected by 80 % of it.
+        inside). None takes six points in one piece, more where the strain's degree asks for it: enough to place the
+        tip of a bent rod of given strain to some 1e-5 of its length.
 
     Raises
     ------

@@ -79,7 +79,8 @@ class Equilibrium:
         """Smallest eigenvalue of the tangent stiffness relative to the elastic: 1 without loads, 0 where it buckles.
 
         It is the smallest real part of an eigenvalue of K^-1 K_tangent, which does not depend on how the strain is
-        parametrised. Below zero the equilibrium is unstable.
+        parametrised. Below zero the equilibrium is unstable. Above zero it may still flutter under follower loads:
+        the eigenvalues of A of :meth:`Rod.linearise` tell.
         """
         return float(np.linalg.eigvals(np.linalg.solve(self.rod.stiffness.full(), self.stiffness)).real.min())
 

@@ -21,10 +21,10 @@ Why not CasADi's own linearly implicit integrator: for the preset "paper" (8 coo
 studies/speed_integrators.py gave, on one core of a small server, for the tip error at 1 s and the time of one compiled
 sample of 50 ms:
 
-    this method, substeps of 10 / 5 / 2.5 ms      7.2 / 1.8 / 0.45 um     26 / 51 / 98 us        0.8 s to compile
-    "rosenbrock", one step of 50 ms               1.4 um                  179 us                 33 s to compile
+    this method, substeps of 10 / 5 / 2.5 ms      7.0 / 1.8 / 0.45 um     24 / 46 / 96 us        0.8 s to compile
+    "rosenbrock", one step of 50 ms               1.4 um                  188 us                 32 s to compile
 
-Three to four times quicker at like accuracy, and compiled in a fortieth of the time.
+Four times quicker at like accuracy, and compiled in a fortieth of the time.
 
 The default substep is 1/250 of the period of the slowest mode of the straight rod or 1/40 of that of the fourth slowest
 (the second of both bending axes), whichever is shorter: 5 ms there. It follows the rod's stiffness and mass: a rod that
