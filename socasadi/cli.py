@@ -28,6 +28,7 @@ from .campaign import (
     Trial,
     assess,
     clock,
+    interruptible,
     progress_line,
 )
 from .codegen import CompilationError
@@ -63,7 +64,8 @@ def run(
     out.print(f"{script}: {study.trials} trials of {study.task.duration:g} s, into {folder}")
     start = time.monotonic()
     try:
-        _run(study, folder, resume)
+        with interruptible():
+            _run(study, folder, resume)
     except KeyboardInterrupt:
         out.print(f"\nStopped. Every finished trial is stored; go on with: {_again(script, folder, iterations, seed)}")
         raise typer.Exit(130) from None

@@ -3,6 +3,7 @@
 from ._assess import Assessment, Verdict, assess
 from ._cost import Cost, Score
 from ._episode import Episode, fly
+from ._interrupt import interruptible
 from ._journal import Flight, Journal, JournalError, Trial
 from ._probe import probe
 from ._progress import Progress, clock, print_progress, progress_line
@@ -33,6 +34,7 @@ __all__ = [
     "assess",
     "clock",
     "fly",
+    "interruptible",
     "print_progress",
     "probe",
     "progress_line",

@@ -13,6 +13,7 @@ import numpy as np
 from ..mpc import Controller, DesignError
 from ..tune import Search
 from ._episode import Episode, fly
+from ._interrupt import interruptible
 from ._journal import Journal, Trial
 from ._progress import Clock, Progress
 from ._result import Result, RunError, best_trial, journal_path, read_settings
@@ -27,7 +28,7 @@ _MAY_DIFFER = ("iterations", "verifications")
 def run_campaign(study: "Study", folder: Path, *, resume: bool, progress: Callable[[Progress], None] | None) -> Result:
     """Ask, build, fly, score, store, tell, until the study has its trials; see :meth:`Study.run`."""
     _check_folder(study, folder, resume)
-    with Journal(journal_path(folder), writer=True) as journal:
+    with interruptible(), Journal(journal_path(folder), writer=True) as journal:
         trials, search, clock = journal.trials(), study.optimizer(), Clock()
         if len(trials) > study.trials:
             raise RunError(f"{folder} holds {len(trials)} trials already; ask for no fewer, not for {study.trials}")

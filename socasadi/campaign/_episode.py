@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from ..model import Record
 from ..mpc import Controller
 from ..plant import Plant
+from ._interrupt import check_interrupt
 from ._task import Task
 
 _SHAPE_POINTS = 15
@@ -78,6 +79,7 @@ def fly(plant: Plant, controller: Controller, task: Task, *, seed: int, time_lim
         flight.begin(y)
         controller.reset(plant.tension)
         for t in range(samples):
+            check_interrupt()
             if time.monotonic() > deadline:
                 raise TimeoutError(f"took longer than its limit of {time_limit:g} s")
             wanted = task.reference((t + preview) * mpc.sample_time)
@@ -88,6 +90,7 @@ def fly(plant: Plant, controller: Controller, task: Task, *, seed: int, time_lim
                 y = measured(plant, plant.step(u, **force))
             flight.note(u, y)
     except Exception as error:  # whatever a plant raises is a result of the experiment
+        check_interrupt()
         return flight.end(controller.info.fallbacks, failure=f"{type(error).__name__}: {error}")
     return flight.end(controller.info.fallbacks)
 

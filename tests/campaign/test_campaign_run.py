@@ -377,3 +377,28 @@ class TestMoreDamage:
             with pytest.raises(Killed):
                 toy_study.run(tmp_path / "run", progress=None)
         assert len(replace(toy_study, iterations=0).run(tmp_path / "run", resume=True, progress=None).trials) == 6
+
+
+@pytest.mark.parametrize("then", [lambda: None, lambda: float("no number")])
+def test_ctrl_c_that_a_library_drops_still_ends_the_run_and_loses_no_trial(toy_study, tmp_path, then):
+    """CasADi's conversion of arguments drops a KeyboardInterrupt, or fails in its own way."""
+    plant, steps = toy_study.plant, iter(range(10_000))
+    step = plant.step
+
+    def dropping(tension, tip_force=None):
+        if next(steps) == 50:  # in the third trial of 20 samples
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+                time.sleep(0.1)
+            except KeyboardInterrupt:
+                then()
+        return step(tension, tip_force)
+
+    plant.step = dropping
+    with pytest.raises(KeyboardInterrupt):
+        toy_study.run(tmp_path / "run")
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    del plant.step
+    result = toy_study.run(tmp_path / "run", resume=True)
+    assert [trial.number for trial in result.trials] == list(range(1, 13))
+    assert all(trial.failure is None for trial in result.trials)
