@@ -405,8 +405,8 @@ class Rod:
         answer, halve the substep, raise the strains' orders and the quadrature points until it stays.
 
         The method takes a little energy: over tens of periods an undamped rod needs shorter substeps. Thrown through
-        several radians without any damping it may diverge (the state is then not finite) where 2 % of damping in the
-        first mode are enough; :meth:`reference_step` copes with it.
+        several radians without any damping it may diverge (the state is then not finite), seen with substeps down to a
+        quarter of the default; 2 % of damping in the first mode were enough there.
         """
         key = (sample_time, substep)
         if key not in self._steps:

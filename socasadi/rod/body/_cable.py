@@ -42,7 +42,7 @@ class Converging:
 class Helix:
     """A route around the axis at ``radius``, m, one turn in ``pitch``, m; it starts at ``angle``, rad, from +y.
 
-    A positive pitch turns from +y towards +z. With a friction of zero a helical cable twists the rod.
+    A positive pitch turns from +y towards +z. A helical cable that is pulled twists the rod.
 
     Examples
     --------
