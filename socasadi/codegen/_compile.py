@@ -6,12 +6,12 @@ import shlex
 import shutil
 import subprocess
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import casadi as ca
 
-from ._cache import cached_file
+from ._cache import cache_directory, cached_file
 
 _FLAGS = ("-O2", "-fPIC", "-shared")
 
@@ -32,9 +32,8 @@ def c_compiler() -> list[str] | None:
 def compiled(function: ca.Function, *, flags: Sequence[str] = ()) -> ca.Function:
     """The same Function as machine code.
 
-    The C that CasADi generates for ``function`` is compiled, for this machine's own processor, to a shared library,
-    which is kept in :func:`cache_directory` under a hash of the C text, the compiler, the processor and the flags: a
-    second call, in this process or another, only loads it. Without a C compiler ``function`` itself is returned, and
+    The C that CasADi generates for ``function`` becomes a :func:`shared_library`, so that a second call, in this
+    process or another, only loads it. Without a C compiler ``function`` itself is returned, and
     a warning says so once for the process.
 
     Parameters
@@ -49,31 +48,57 @@ def compiled(function: ca.Function, *, flags: Sequence[str] = ()) -> ca.Function
     CompilationError
         The compiler rejected the code.
     """
+    if c_compiler() is None:
+        warn_interpreted()
+        return function
+    sources = {f"{function.name()}.c": _c_source(function)}
+    try:
+        return ca.external(function.name(), str(shared_library(function.name(), sources, flags=flags)))
+    except RuntimeError:  # a damaged file: cut off by a full disk, say
+        return ca.external(function.name(), str(shared_library(function.name(), sources, flags=flags, anew=True)))
+
+
+def shared_library(name: str, sources: Mapping[str, str], *, flags: Sequence[str] = (), anew: bool = False) -> Path:
+    """C texts compiled, for this machine's own processor, to a shared library, or the one from an earlier call.
+
+    It is kept in :func:`cache_directory` under a hash of the texts, the compiler, the processor and the flags.
+
+    Parameters
+    ----------
+    name
+        How the file's name begins.
+    sources
+        Texts by file name; those that end in .c are compiled, and may include the others.
+    flags
+        Further compiler and linker flags: include folders, definitions, libraries.
+    anew
+        Whether to compile even if the library is there.
+
+    Raises
+    ------
+    CompilationError
+        There is no compiler, or it rejected the code.
+    """
     compiler = c_compiler()
     if compiler is None:
-        _warn_interpreted()
-        return function
-    source = _c_source(function)
+        raise CompilationError(f"no C compiler found ({_advice()})")
     native, target = _target(tuple(compiler))
-    parts = (source, *compiler, target, *_FLAGS, *native, *flags)
+    parts = (*(text for item in sorted(sources.items()) for text in item), *compiler, target, *_FLAGS, *native, *flags)
     digest = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
-    name = f"{function.name()}-{digest}.so"
+    file = f"{name}-{digest}.so"
 
     def build(folder: Path) -> None:
-        (folder / "function.c").write_text(source)
-        command = [*compiler, *_FLAGS, *native, "function.c", "-o", name, *flags, "-lm"]
+        for source, text in sources.items():
+            (folder / source).write_text(text)
+        units = [source for source in sources if source.endswith(".c")]
+        command = [*compiler, *_FLAGS, *native, *units, "-o", file, *flags, "-lm"]
         run = subprocess.run(command, cwd=folder, capture_output=True, text=True)
         if run.returncode:
-            raise CompilationError(
-                f"{' '.join(command)} failed on the C of {function.name()!r}:\n{run.stderr.strip()[:2000]}"
-            )
+            raise CompilationError(f"{' '.join(command)} failed on the C of {name!r}:\n{run.stderr.strip()[:2000]}")
 
-    library = cached_file(name, build)
-    try:
-        return ca.external(function.name(), str(library))
-    except RuntimeError:  # a damaged file: cut off by a full disk, say
-        library.unlink(missing_ok=True)
-        return ca.external(function.name(), str(cached_file(name, build)))
+    if anew:
+        (cache_directory() / file).unlink(missing_ok=True)
+    return cached_file(file, build)
 
 
 def _c_source(function: ca.Function) -> str:
@@ -101,9 +126,10 @@ def _advice() -> str:
 
 
 @functools.cache
-def _warn_interpreted() -> None:
+def warn_interpreted() -> None:
+    """Say once for the process that there is no C compiler."""
     warnings.warn(
-        f"no C compiler found ({_advice()}): models run interpreted, more slowly but with the same results",
+        f"no C compiler found ({_advice()}): everything runs interpreted, more slowly but with the same results",
         RuntimeWarning,
         stacklevel=3,
     )
