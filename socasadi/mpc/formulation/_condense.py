@@ -23,10 +23,11 @@ def predict(A: ca.MX, B: ca.MX, C: ca.MX, D: ca.MX, horizon: int) -> Prediction:
     where block row k of :math:`\Phi` is :math:`C A^k`, and block (k, j) of :math:`\Gamma` is
     :math:`C A^{k-1-j} B` for j < k, plus D on the diagonal j = k - 1.
     """
-    powers = [ca.MX.eye(A.shape[0])]
+    powers, forced = [ca.MX.eye(A.shape[0])], [B]
     for _ in range(horizon):
         powers.append(A @ powers[-1])
-    forced = [power @ B for power in powers[:-1]]
+        forced.append(A @ forced[-1])
+    forced.pop()
     markov = [C @ block for block in forced]
     markov[0] += D
     zero = ca.MX(C.shape[0], B.shape[1])

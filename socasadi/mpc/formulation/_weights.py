@@ -48,8 +48,42 @@ def check_input_term(term: str) -> None:
         raise ValueError(f"unknown input_term {term!r}; there are {', '.join(get_args(InputTerm))}")
 
 
-def bound_pair(bounds: tuple, size: int, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper bounds, each (size,), from a pair of numbers or of vectors; they must be finite and ascend."""
+def positive_numbers(values, size: int, name: str, *, zero: bool = False) -> np.ndarray:
+    """(size,) from a number or ``size`` numbers, each positive, or not negative where ``zero`` is allowed."""
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        array = np.asarray(None)
+    if array.dtype.kind not in "fiu" or array.shape not in ((), (size,)):
+        raise ValueError(f"{name} is a number or {size} numbers, not {values!r}")
+    array = array.astype(float)
+    if not np.isfinite(array).all() or (array < 0).any() or (not zero and (array == 0).any()):
+        raise ValueError(f"{name} must be {'zero or ' if zero else ''}positive, not {values!r}")
+    return np.broadcast_to(array, (size,)).copy()
+
+
+def covariance(noise, size: int, name: str, *, definite: bool = False) -> np.ndarray:
+    """(size, size) from standard deviations, one or ``size`` of them, or from a covariance matrix."""
+    if np.ndim(noise) < 2 or not isinstance(noise, tuple | list | np.ndarray):
+        try:
+            return np.diag(positive_numbers(noise, size, name) ** 2)
+        except ValueError as error:
+            if "must be positive" in str(error):
+                raise
+            raise ValueError(
+                f"{name} is a standard deviation, {size} of them or a ({size}, {size}) covariance matrix, not {noise!r}"
+            ) from None
+    matrix = weight_matrix(noise, size, name)  # pyright: ignore[reportArgumentType]
+    if definite and np.linalg.eigvalsh(matrix)[0] <= 0:
+        raise ValueError(f"{name} must be positive definite, not {noise}: a sensor without noise is not modelled")
+    return matrix
+
+
+def bound_pair(bounds: tuple, size: int, name: str, *, infinite: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper bounds, each (size,), from a pair of numbers or of vectors; they must ascend.
+
+    They must be finite, or with ``infinite`` may be infinite where there is no bound.
+    """
     try:
         sides = [np.asarray(side) for side in bounds]
         if any(side.dtype.kind not in "fiu" for side in sides):
@@ -59,8 +93,10 @@ def bound_pair(bounds: tuple, size: int, name: str) -> tuple[np.ndarray, np.ndar
         raise ValueError(
             f"{name} is a pair (lower, upper) of numbers or of {size} numbers each, not {bounds!r}"
         ) from None
-    if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
+    if not infinite and not (np.isfinite(lower).all() and np.isfinite(upper).all()):
         raise ValueError(f"{name} must be finite, not {bounds}")
+    if np.isnan(lower).any() or np.isnan(upper).any():
+        raise ValueError(f"{name} must be finite, or infinite where there is no bound, not {bounds}")
     if (lower >= upper).any():
         i = int(np.argmax(lower >= upper))
         raise ValueError(f"{name} cross: lower {lower[i]:g} is not below upper {upper[i]:g}")
