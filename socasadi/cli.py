@@ -28,11 +28,12 @@ from .campaign import (
     Trial,
     assess,
     clock,
+    emulate,
     interruptible,
     progress_line,
 )
 from .codegen import CompilationError
-from .export import ExportError, NotBuiltError, build_and_replay
+from .export import EmulatorError, ExportError, NotBuiltError, build_and_replay
 from .report import figures, save_figures
 
 app = typer.Typer(
@@ -110,12 +111,35 @@ def plot(
 def export(
     run_folder: RunFolder,
     folder: Annotated[Path, typer.Option("--out", help="Folder for the C files.")],
-    real: Annotated[str, typer.Option(help="double")] = "double",
-    solver: Annotated[str, typer.Option(help="osqp")] = "osqp",
+    real: Annotated[str, typer.Option(help="What it computes in: double or float.")] = "double",
+    solver: Annotated[str, typer.Option(help="QP solver: active-set or osqp.")] = "active-set",
+    name: Annotated[str, typer.Option(help="Prefix of all that the C defines.")] = "controller",
 ) -> None:
     """Write the best controller of a run as C, build it and replay its episode."""
-    Result.open(run_folder).export(folder, real=real, solver=solver)
+    Result.open(run_folder).export(folder, real=real, solver=solver, name=name)
     out.print(f"{folder}: {_replay(folder)}")
+
+
+@app.command(name="emulate")
+def emulate_(
+    run_folder: RunFolder,
+    real: Annotated[str, typer.Option(help="float (Cortex-M4F) or double (Cortex-M7).")] = "float",
+) -> None:
+    """Fly the best controller of a run on an emulated microcontroller, and say what it costs there."""
+    with out.status("flying with the controller on an emulated microcontroller"):
+        flown = emulate(Result.open(run_folder), real=real)
+    figures, seconds = flown.footprint, len(flown.episode.tension) * flown.episode.sample_time
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    table.add_row("processor", f"{flown.core}, {flown.real} (emulated)")
+    table.add_row("episode", f"{seconds:g} s, {flown.episode.fallbacks} fallbacks")
+    table.add_row("inputs against the same C here", f"{flown.difference:.1e} of the bound at most")
+    table.add_row(
+        "flash, RAM, stack", f"{figures.flash / 1000:.1f} kB, {figures.ram / 1000:.1f} kB, {figures.stack} bytes"
+    )
+    table.add_row(
+        "instructions a step", f"{figures.instructions_median:,} in the median, {figures.instructions_worst:,} at worst"
+    )
+    out.print(table)
 
 
 def main() -> None:
@@ -123,7 +147,16 @@ def main() -> None:
     warnings.showwarning = lambda message, *_, **__: print(f"socasadi: {message}", file=sys.stderr)
     try:
         app()
-    except (RunError, JournalError, ExportError, CompilationError, ValueError, TypeError, OSError) as error:
+    except (
+        RunError,
+        JournalError,
+        ExportError,
+        EmulatorError,
+        CompilationError,
+        ValueError,
+        TypeError,
+        OSError,
+    ) as error:
         print(f"socasadi: {error}", file=sys.stderr)
         sys.exit(1)
 

@@ -1,5 +1,6 @@
 """The command, as a user runs it."""
 
+import json
 import os
 import re
 import shutil
@@ -13,6 +14,7 @@ import pytest
 
 from socasadi.campaign import Journal
 from socasadi.codegen import c_compiler
+from socasadi.export import toolchain
 
 ROOT = Path(__file__).parent.parent
 STUDY = """
@@ -122,7 +124,7 @@ def test_ctrl_c_says_how_to_go_on_and_going_on_finishes(tmp_path):
         (("run", "broken.py"), "broken.py, line 2: NameError: name 'stuudy' is not defined"),
         (("run", "syntax.py"), "syntax.py, line 1: "),
         (("run", "beside.py"), "beside.py defines no `study`"),
-        (("run", "backend.py"), "unknown QP back end 'gurobi'; there are daqp, qpoases, osqp"),
+        (("run", "backend.py"), "unknown QP back end 'gurobi'; there are active-set, daqp, qpoases, osqp"),
         (("show", "nowhere"), "there is no run folder nowhere"),
         (("plot", "."), ". is no run folder: it has no study.json"),
         (("export", "nowhere", "--out", "c"), "there is no run folder nowhere"),
@@ -143,12 +145,50 @@ def test_a_mistake_is_answered_by_one_sentence(tmp_path, arguments, words):
     assert len(run.stderr.strip().splitlines()) == 1
 
 
-def test_what_cannot_be_exported_yet_is_said(finished, tmp_path):
+@pytest.mark.parametrize("options", [("--real", "float"), ("--solver", "osqp"), ("--name", "arm")])
+def test_a_run_is_exported_in_every_way(finished, tmp_path, options):
+    if "osqp" in options:
+        pytest.importorskip("osqp", reason="the package osqp is not installed")
     folder, _ = finished
-    for option, words in ((("--real", "float"), "real='float'"), (("--solver", "active-set"), "solver='active-set'")):
-        run = socasadi("export", folder / "runs" / "study", "--out", tmp_path / "c", *option, cwd=tmp_path)
-        assert run.returncode == 1
-        assert f"{words} cannot be exported yet" in run.stderr
+    run = socasadi("export", folder / "runs" / "study", "--out", tmp_path / "c", *options, cwd=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert "largest difference from Python" in run.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--real", "half"), "unknown real 'half'; there are double, float"),
+        (("--solver", "qrqp"), "unknown solver 'qrqp'; there are active-set, osqp"),
+        (("--name", "9"), "the name '9' does not do for C"),
+    ],
+)
+def test_what_cannot_be_exported_is_said(finished, tmp_path, options, said):
+    folder, _ = finished
+    run = socasadi("export", folder / "runs" / "study", "--out", tmp_path / "c", *options, cwd=tmp_path)
+    assert run.returncode == 1
+    assert said in run.stderr
+
+
+@pytest.mark.skipif(toolchain() is not None, reason=f"no emulated microcontroller: {toolchain()}")
+@pytest.mark.parametrize(("real", "core"), [("float", "cortex-m4"), ("double", "cortex-m7")])
+def test_a_run_flies_with_its_controller_on_an_emulated_microcontroller(finished, real, core):
+    folder, _ = finished
+    run = socasadi("emulate", "runs/study", "--real", real, cwd=folder)
+    assert run.returncode == 0, run.stderr
+    assert core in run.stdout
+    assert "0.0e+00 of the bound" in run.stdout
+    kept = json.loads((folder / "runs" / "study" / f"microcontroller-{real}.json").read_text())
+    assert kept["difference"] == 0
+    assert 0 < kept["instructions_median"] <= kept["instructions_worst"]
+
+
+def test_without_the_cross_compiler_the_packages_are_named(finished, monkeypatch):
+    folder, _ = finished
+    monkeypatch.setenv("PATH", str(folder / "nothing"))
+    run = socasadi("emulate", "runs/study", cwd=folder)
+    assert run.returncode == 1
+    assert "apt-get install gcc-arm-none-eabi" in run.stderr
 
 
 def test_a_run_folder_that_exists_needs_resume_and_the_same_settings(finished):

@@ -2,6 +2,7 @@
 
 from ._assess import Assessment, Verdict, assess
 from ._cost import Cost, Score
+from ._emulate import ProcessorInTheLoop, emulate
 from ._episode import Episode, fly
 from ._interrupt import interruptible
 from ._journal import Flight, Journal, JournalError, Trial
@@ -22,6 +23,7 @@ __all__ = [
     "Journal",
     "JournalError",
     "Origin",
+    "ProcessorInTheLoop",
     "Progress",
     "Pulse",
     "Result",
@@ -33,6 +35,7 @@ __all__ = [
     "Verdict",
     "assess",
     "clock",
+    "emulate",
     "fly",
     "interruptible",
     "print_progress",

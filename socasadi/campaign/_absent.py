@@ -21,6 +21,10 @@ class AbsentPlant:
     def tension(self) -> np.ndarray:
         return np.zeros(self.inputs)
 
+    @property
+    def disturbance(self) -> np.ndarray:
+        return np.zeros(0)
+
     def reset(
         self, tip: ArrayLike | None = None, *, seed: int | None = None, tension_bounds: tuple[Any, Any] = (-inf, inf)
     ) -> np.ndarray:

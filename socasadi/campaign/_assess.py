@@ -83,6 +83,8 @@ def assess(
     thetas, judged, unidentified = {"best": result.best.theta, **(rivals or {})}, None, None
     with Journal(journal_path(result.folder), writer=True) as journal:
         try:
+            if study.mpc.measured_disturbances:
+                raise ValueError("a probing record does not hold the disturbances that are measured")
             notify("probing the plant")
             fitted, judged = (_probing(result, journal, index) for index in (1, 2))
             notify("identifying a model")

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..mpc import Controller, DesignError
+from ..mpc import DesignError
 from ..tune import Search
-from ._episode import Episode, fly
+from ._episode import Episode, Pilot, fly
 from ._interrupt import interruptible
 from ._journal import Journal, Trial
 from ._progress import Clock, Progress
@@ -104,7 +104,7 @@ def _try_next(study: "Study", search: Search, number: int) -> tuple[Trial, Episo
     return Trial(number, phase, theta, score, failure, started, seconds), episode
 
 
-def fly_once(study: "Study", controller: Controller, stream: tuple[int, ...]) -> Episode:
+def fly_once(study: "Study", controller: Pilot, stream: tuple[int, ...]) -> Episode:
     """One episode of the study, its noise drawn from the study's seed and ``stream``."""
     seed = int(np.random.SeedSequence([study.seed, *stream]).generate_state(1)[0])
     return fly(study.plant, controller, study.task, seed=seed, time_limit=study.time_limit)

@@ -2,18 +2,32 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Record
-from ..mpc import Controller
+from ..mpc import ControllerInfo, LinearMPC
 from ..plant import Plant
 from ._interrupt import check_interrupt
 from ._task import Task
 
 _SHAPE_POINTS = 15
 _SHAPE_EVERY = 5
+
+
+class Pilot(Protocol):
+    """What an episode needs of a controller, wherever it runs; see :class:`socasadi.mpc.Controller`."""
+
+    mpc: LinearMPC
+
+    @property
+    def info(self) -> ControllerInfo: ...
+
+    def reset(self, u_prev: ArrayLike = 0.0) -> None: ...
+
+    def step(self, y: ArrayLike, reference: ArrayLike, disturbance: ArrayLike | None = None) -> np.ndarray: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +47,8 @@ class Episode:
         (m,) N, the tensions before the first sample.
     shapes
         (k, points, 3) m, the rod every fifth sample; empty when the plant does not know its shape.
+    disturbance
+        (T, d) measured disturbances that the controller was told; (T, 0) when it takes none.
     fallbacks
         Samples in which the controller could not apply its QP's answer.
     failure
@@ -48,6 +64,7 @@ class Episode:
     tension: np.ndarray
     held: np.ndarray
     shapes: np.ndarray
+    disturbance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     fallbacks: int = 0
     failure: str | None = None
     seconds: dict[str, float] = field(default_factory=dict)
@@ -63,14 +80,14 @@ class Episode:
         return Record(self.sample_time, self.tension, self.output)
 
 
-def fly(plant: Plant, controller: Controller, task: Task, *, seed: int, time_limit: float) -> Episode:
+def fly(plant: Plant, controller: Pilot, task: Task, *, seed: int, time_limit: float) -> Episode:
     """Run ``controller`` against ``plant`` along the task's reference.
 
     What the plant raises ends the episode and is its ``failure``, as is more than ``time_limit`` s of wall time; the
     samples until then are kept.
     """
     mpc = controller.mpc
-    samples, preview = task.samples(mpc.sample_time), np.arange(1, mpc.horizon + 1)
+    samples, preview = task.samples(mpc.sample_time), np.arange(1, mpc.reference_rows + 1)
     flight = _Flight(plant, mpc.sample_time, task)
     deadline = time.monotonic() + time_limit
     try:
@@ -83,12 +100,13 @@ def fly(plant: Plant, controller: Controller, task: Task, *, seed: int, time_lim
             if time.monotonic() > deadline:
                 raise TimeoutError(f"took longer than its limit of {time_limit:g} s")
             wanted = task.reference((t + preview) * mpc.sample_time)
+            known = np.array(getattr(plant, "disturbance", ()), dtype=float) if mpc.measured_disturbances else None
             with flight.timing("controller"):
-                u = controller.step(y, wanted)
+                u = controller.step(y, wanted, known)
             force = {} if task.pulse is None else {"tip_force": task.pulse.at(t * mpc.sample_time)}
             with flight.timing("plant"):
                 y = measured(plant, plant.step(u, **force))
-            flight.note(u, y)
+            flight.note(u, y, known)
     except Exception as error:  # whatever a plant raises is a result of the experiment
         check_interrupt()
         return flight.end(controller.info.fallbacks, failure=f"{type(error).__name__}: {error}")
@@ -115,6 +133,7 @@ class _Flight:
         self.truth: list[np.ndarray] = []
         self.tension: list[np.ndarray] = []
         self.shapes: list[np.ndarray] = []
+        self.disturbance: list[np.ndarray] = []
         self.held = np.zeros(plant.inputs)
         self.seconds = {"plant": 0.0, "controller": 0.0}
 
@@ -130,8 +149,9 @@ class _Flight:
         self.held = np.array(self.plant.tension, dtype=float)
         self._see(y)
 
-    def note(self, u: np.ndarray, y: np.ndarray) -> None:
+    def note(self, u: np.ndarray, y: np.ndarray, disturbance: np.ndarray | None) -> None:
         self.tension.append(u)
+        self.disturbance.append(np.zeros(0) if disturbance is None else disturbance)
         self._see(y)
 
     def _see(self, y: np.ndarray) -> None:
@@ -151,6 +171,7 @@ class _Flight:
             tension=np.reshape(self.tension, (-1, m)),
             held=self.held,
             shapes=np.reshape(self.shapes, (-1, _SHAPE_POINTS, 3)).astype(np.float32),
+            disturbance=np.reshape(self.disturbance, (len(self.tension), -1)) if self.tension else np.zeros((0, 0)),
             fallbacks=fallbacks,
             failure=failure,
             seconds=self.seconds,

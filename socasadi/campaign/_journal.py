@@ -250,7 +250,7 @@ def _score(text: str | None) -> Score | None:
     return None if text is None else Score(**json.loads(text))
 
 
-_ARRAYS = ("output", "reference", "truth", "tension", "held", "shapes")
+_ARRAYS = ("output", "reference", "truth", "tension", "held", "shapes", "disturbance")
 
 
 def _pack(episode: Episode) -> bytes:
@@ -263,5 +263,5 @@ def _pack(episode: Episode) -> bytes:
 def _unpack(blob: bytes) -> Episode:
     with np.load(io.BytesIO(blob), allow_pickle=False) as data:
         sample_time, fallbacks, failure, seconds = json.loads(data["about"].item())
-        arrays = {name: data[name] for name in _ARRAYS}
+        arrays = {name: data[name] for name in _ARRAYS if name in data}
     return Episode(sample_time, **arrays, fallbacks=fallbacks, failure=failure, seconds=seconds)

@@ -111,15 +111,18 @@ class Result:
         with self._journal() as journal:
             return journal.flights()
 
-    def export(self, folder: str | Path, *, real: str = "double", solver: str = "osqp") -> Path:
+    def export(
+        self, folder: str | Path, *, real: str = "double", solver: str = "active-set", name: str = "controller"
+    ) -> Path:
         """Write the best trial's controller as C, with its episode to replay; see :func:`socasadi.export.export`."""
-        return export(self._controller_record(), folder, real=real, solver=solver)
+        return export(self.controller_record(), folder, real=real, solver=solver, name=name)
 
-    def _controller_record(self) -> ControllerRecord:
+    def controller_record(self) -> ControllerRecord:
+        """The best trial's controller with its episode, as :func:`socasadi.export.export` takes it."""
         best, mpc = self.best, self.study.mpc
         episode = self.episode(best.number)
         samples = len(episode.tension)
-        ahead = np.arange(1, mpc.horizon + 1)
+        ahead = np.arange(1, mpc.reference_rows + 1)
         preview = [self.study.task.reference((t + ahead) * mpc.sample_time) for t in range(samples)]
         entries = zip(mpc.model.entries, best.theta, strict=True)
         digest = hashlib.sha256(journal_path(self.folder).read_bytes()).hexdigest()
@@ -129,6 +132,7 @@ class Result:
             output=episode.output[:samples],
             preview=np.array(preview),
             held=episode.held,
+            disturbance=episode.disturbance if mpc.measured_disturbances else None,
             provenance=(
                 f"trial {best.number} of {len(self.trials)}, J = {best.J!r}",
                 f"prediction model {type(mpc.model).__name__}, theta:",

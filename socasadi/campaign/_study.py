@@ -81,6 +81,10 @@ class Study:
         ):
             if of_plant != of_mpc:
                 raise ValueError(f"{name} of the plant is {of_plant}, but {of_mpc} of the MPC; make them equal")
+        if mpc.measured_disturbances and not hasattr(plant, "disturbance"):
+            raise ValueError(
+                f"the MPC has {mpc.measured_disturbances} measured disturbances, but the plant has no `disturbance`"
+            )
         for name, least in (("seed_points", 1), ("iterations", 0), ("seed", 0), ("verifications", 0)):
             value = getattr(self, name)
             if not isinstance(value, Integral) or value < least:

@@ -1,6 +1,28 @@
 """A controller written out as a folder of C with its test."""
 
+from ._accept import FLOAT_SHARE, check_single_precision
+from ._build import build_and_replay
+from ._errors import ExportError, NotBuiltError
+from ._figures import core_for
 from ._record import ControllerRecord
-from ._write import ExportError, NotBuiltError, build_and_replay, export
+from ._write import SOLVERS, export
+from .microcontroller import Core, Emulated, EmulatorError, Firmware, Footprint, build, toolchain
 
-__all__ = ["ControllerRecord", "ExportError", "NotBuiltError", "build_and_replay", "export"]
+__all__ = [
+    "FLOAT_SHARE",
+    "SOLVERS",
+    "ControllerRecord",
+    "Core",
+    "Emulated",
+    "EmulatorError",
+    "ExportError",
+    "Firmware",
+    "Footprint",
+    "NotBuiltError",
+    "build",
+    "build_and_replay",
+    "check_single_precision",
+    "core_for",
+    "export",
+    "toolchain",
+]

@@ -1,3 +1,4 @@
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,9 +20,11 @@ class ControllerRecord:
     output
         (T, p) m, measured at samples 0 ... T - 1 of an episode.
     preview
-        (T, horizon, p) m, what was wanted from each of these samples on.
+        (T, rows, p) m, what was wanted from each of these samples on; as many rows as the specification looks at.
     held
         (m,) N, tensions before the first sample.
+    disturbance
+        (T, k) measured disturbances; None for an MPC without.
     provenance
         Lines that go into the exported header: theta, cost, versions.
     """
@@ -31,13 +34,26 @@ class ControllerRecord:
     output: np.ndarray
     preview: np.ndarray
     held: np.ndarray
+    disturbance: np.ndarray | None = None
     provenance: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        T, p, N = len(self.output), self.mpc.outputs, self.mpc.horizon
-        shapes = {"output": (T, p), "preview": (T, N, p), "held": (self.mpc.inputs,)}
+        mpc, T = self.mpc, len(self.output)
+        if self.disturbance is None:
+            object.__setattr__(self, "disturbance", np.zeros((T, 0)))
+        shapes = {
+            "output": (T, mpc.outputs),
+            "preview": (T, mpc.reference_rows, mpc.outputs),
+            "held": (mpc.inputs,),
+            "disturbance": (T, mpc.measured_disturbances),
+        }
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise ValueError(f"{name} of the recorded episode has shape {getattr(self, name).shape}, not {shape}")
         if not T:
             raise ValueError("the recorded episode is empty: there is nothing to check the controller on")
+
+    def samples(self) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """What :meth:`Controller.step` was given at each sample: output, preview, measured disturbance."""
+        assert self.disturbance is not None
+        return zip(self.output, self.preview, self.disturbance, strict=True)

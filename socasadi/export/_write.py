@@ -1,48 +1,80 @@
-import dataclasses
 import importlib.metadata
-import platform
 import re
-import shlex
-import shutil
-import subprocess
 from collections.abc import Sequence
-from importlib.resources import files
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import casadi as ca
 import jinja2
 import numpy as np
 
-from ..codegen import c_compiler
-from ..mpc import control_law
+from ..mpc import Tables, check_real, controller_sources, tables
+from ._accept import FLOAT_SHARE, check_single_precision, expected_inputs
+from ._errors import ExportError
+from ._figures import Figures, core_for, emulated_figures, host_figures
 from ._record import ControllerRecord
+from .osqp import osqp_adapter, write_osqp
 
-TOLERANCE = 1e-4
-"""Largest difference between a tension of the exported C and Python's that the replay allows, N: OSQP stops
-iterating at a residual, so that its answers are good to about 1e-6 of the input bound."""
+SOLVERS = ("active-set", "osqp")
+"""QP solvers of an exported controller."""
+
+# How far the replay may be from Python, as a share of the input bound.
+_SHARE = {"double": 1e-6, "float": FLOAT_SHARE}
+
+_TEMPLATES = {
+    "NAME_data.h": "{}_data.h",
+    "NAME.h": "{}.h",
+    "NAME.c": "{}.c",
+    **{same: same for same in ("vectors.h", "replay.c", "example.c", "Makefile", "CMakeLists.txt")},
+}
+_MARK = "Made by socasadi"
 
 
-_TEMPLATES = ("controller_data.h", "episode.h", "README.md")
-_GENERATED = (*_TEMPLATES, "law.c", "law.h", "osqp")
+@dataclass(frozen=True)
+class _Kind:
+    """How a controller is written out."""
+
+    real: str
+    solver: str
+    name: str
+
+    def __post_init__(self) -> None:
+        try:
+            check_real(self.real)
+        except ValueError as error:
+            raise ExportError(str(error)) from None
+        if self.solver not in SOLVERS:
+            raise ExportError(f"unknown solver {self.solver!r}; there are {', '.join(SOLVERS)}")
+        if not re.fullmatch(r"[a-z][a-z0-9_]*", self.name) or self.name in ("mpc", "qp", "real"):
+            raise ExportError(
+                f"the name {self.name!r} does not do for C: small letters, digits and _, not mpc, qp or real"
+            )
 
 
-class ExportError(RuntimeError):
-    """A controller that cannot be exported as asked, or whose C does not agree with Python."""
-
-
-class NotBuiltError(ExportError):
-    """An exported controller that is written but not built, for want of a compiler or make."""
-
-
-def export(record: ControllerRecord, folder: str | Path, *, real: str = "double", solver: str = "osqp") -> Path:
-    """Write ``record`` as a folder of C: controller, data, QP solver, Makefile, and an episode to replay.
+def export(
+    record: ControllerRecord,
+    folder: str | Path,
+    *,
+    real: str = "double",
+    solver: str = "active-set",
+    name: str = "controller",
+    figures: bool = True,
+) -> Path:
+    """Write ``record`` as a folder of C: controller, data, QP solver, build files, example, and an episode to replay.
 
     Parameters
     ----------
     folder
         Made when it is not there; files of an earlier export in it are replaced.
-    real, solver
-        ``"double"`` and ``"osqp"``.
+    real
+        What it computes in: ``"double"``, or ``"float"``, which is compared with double first.
+    solver
+        ``"active-set"``, the project's own, or ``"osqp"``, by OSQP's code generator (``pip install osqp``).
+    name
+        Prefix of all that the C defines: two controllers of different names fit in one program.
+    figures
+        Whether to build it, on this machine and, where the tools are installed, for an emulated microcontroller, for
+        what its README says of size and speed.
 
     Returns
     -------
@@ -52,124 +84,130 @@ def export(record: ControllerRecord, folder: str | Path, *, real: str = "double"
     Raises
     ------
     ExportError
-        Another ``real`` or ``solver`` is asked for, or the folder holds files of others by the same names.
+        ``real``, ``solver`` or ``name`` is none, single precision does not do, or the folder holds files of others by
+        the same names.
     """
-    if real != "double":
-        raise ExportError(f"real={real!r} cannot be exported yet: OSQP is used in double precision; use real='double'")
-    if solver != "osqp":
-        raise ExportError(f"solver={solver!r} cannot be exported yet; use solver='osqp'")
-    folder = Path(folder)
-    sources = list(files("socasadi.export").joinpath("c").iterdir())
-    names = {*(source.name for source in sources), *_GENERATED}
-    if folder.exists() and not folder.is_dir():
-        raise ExportError(f"{folder} is a file; name a folder for the C files")
-    if not (folder / "controller_data.h").exists() and (others := sorted(n for n in names if (folder / n).exists())):
-        raise ExportError(
-            f"{folder} has files of the same names that are not an export's ({', '.join(others)}); choose another"
+    kind, folder = _Kind(real, solver, name), Path(folder)
+    if real == "float":
+        check_single_precision(record)
+    design = record.mpc.design(record.system)
+    given = tables(record.mpc, design, real)  # pyright: ignore[reportArgumentType] (checked above)
+    library = _library(kind)
+    _claim(folder, [*library, *(file.format(name) for file in _TEMPLATES.values()), "README.md"])
+    for file, text in library.items():
+        (folder / file).write_text(text)
+    osqp = None
+    if solver == "osqp":
+        dual = design.dual
+        osqp = write_osqp(
+            design.hessian, design.rows / dual.unit[:, None], dual.softness, dual.price, folder, real=real
         )
-    (folder / "osqp").mkdir(parents=True, exist_ok=True)
-    mpc = dataclasses.replace(record.mpc, backend="osqp")
-    design = mpc.design(record.system)
-
-    laws = ca.CodeGenerator("law.c", {"with_header": True})
-    laws.add(control_law(mpc, design))
-    laws.add(control_law(mpc, design, with_qp=False))
-    laws.generate(f"{folder}/")
-    for source in sources:
-        (folder / source.name).write_text(source.read_text())
-    _copy_osqp(folder / "osqp")
-
     facts = {
-        "title": "Model predictive controller tuned by socasadi",
-        "provenance": [*record.provenance, *_versions()],
-        "sample_time": mpc.sample_time,
-        "outputs": mpc.outputs,
-        "inputs": mpc.inputs,
-        "horizon": mpc.horizon,
-        "order": len(design.A),
-        "scale": mpc.input_scale,
-        "rest": design.rest,
-        "input_bounds": mpc.input_bounds,
-        "samples": len(record.output),
-        "tolerance": TOLERANCE,
-        "held": record.held,
-        "output": record.output,
-        "preview": record.preview.reshape(len(record.output), -1),
-        "tension": expected_tensions(record),
-        "machine": f"{platform.system()} on {platform.machine()}",
-        "stack": f"{8 * _working_numbers(folder / 'law.h') / 1024:.0f}",
+        **_facts(record, kind, given),
+        "sources": [*(f for f in library if f.endswith(".c")), f"{name}.c", *(osqp.sources if osqp else ())],
+        "include_folders": list(osqp.includes) if osqp else [],
+        "osqp": osqp is not None,
     }
-    for name in _TEMPLATES:
-        (folder / name).write_text(_template(name).render(facts))
+    environment = _environment(real)
+    for template, file in _TEMPLATES.items():
+        (folder / file.format(name)).write_text(environment.get_template(template).render(facts))
+    # Last, because it tells what the others need; first without figures, so that a failure leaves an export behind.
+    readme = environment.get_template("README.md")
+    (folder / "README.md").write_text(readme.render(facts, figures=[]))
+    if figures:
+        (folder / "README.md").write_text(readme.render(facts, figures=_figures(folder, kind, record, facts)))
     return folder
 
 
-def expected_tensions(record: ControllerRecord) -> np.ndarray:
-    """What the interpreted controller answers to the recorded episode, (T, m) N."""
-    controller = record.mpc.controller_for(record.system)
-    controller.reset(record.held)
-    return np.array([controller.step(y, rows) for y, rows in zip(record.output, record.preview, strict=True)])
+def _figures(folder: Path, kind: _Kind, record: ControllerRecord, facts: dict[str, Any]) -> list[Figures]:
+    host = host_figures(folder, kind.name, facts["sources"], facts["include_folders"])
+    there = emulated_figures(folder, kind.name, record, core_for(kind.real))
+    return [figures for figures in (host, there) if figures]
 
 
-def build_and_replay(folder: str | Path) -> str:
-    """Run ``make test`` in an exported folder and return what the replay printed.
-
-    Raises
-    ------
-    NotBuiltError
-        There is no C compiler or no make.
-    ExportError
-        The build or the comparison failed; with what was said.
-    """
-    compiler = c_compiler()
-    if compiler is None or shutil.which("make") is None:
-        missing = "C compiler" if compiler is None else "make"
-        raise NotBuiltError(
-            f"the exported controller was not built: no {missing} found; run 'make test' in {folder} where there is one"
+def _library(kind: _Kind) -> dict[str, str]:
+    """The C that is the same for every controller, by file name."""
+    sources = controller_sources()
+    if kind.real == "float":
+        # In the header itself, so that no file of a program can be compiled for the other type.
+        choice = (
+            "#ifndef REAL_FLOAT\n#define REAL_FLOAT /* as this controller was exported */\n#endif\n\n#include <float.h>"
         )
-    run = subprocess.run(
-        ["make", "-s", f"CC={shlex.join(compiler)}", "test"],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        stdin=subprocess.DEVNULL,
-    )
-    if run.returncode:
-        raise ExportError(f"'make test' failed in {folder}:\n{(run.stderr + run.stdout).strip()[-2000:]}")
-    return run.stdout.strip()
+        sources["real.h"] = sources["real.h"].replace("#include <float.h>", choice)
+    if kind.solver == "osqp":
+        sources["qp.c"] = osqp_adapter()
+    return sources
 
 
-def _working_numbers(header: Path) -> int:
-    """How many doubles the larger of the two laws needs to work with, from the header that CasADi generated."""
-    return max(int(count) for count in re.findall(r"#define \w+_SZ_W (\d+)", header.read_text()))
+def _claim(folder: Path, names: list[str]) -> None:
+    """Make the folder, or see that nothing in it is somebody else's."""
+    if folder.exists() and not folder.is_dir():
+        raise ExportError(f"{folder} is a file; name a folder for the C files")
+    readme = folder / "README.md"
+    ours = readme.is_file() and _MARK in readme.read_text(errors="replace")
+    if not ours and (others := sorted(name for name in names if (folder / name).exists())):
+        raise ExportError(
+            f"{folder} has files of the same names that are not an export's ({', '.join(others)}); choose another"
+        )
+    folder.mkdir(parents=True, exist_ok=True)
 
 
-def _copy_osqp(folder: Path) -> None:
-    """Headers and static library of OSQP, as the casadi package holds them."""
-    package = Path(ca.__file__).parent
-    library, headers = package / "libosqpstatic.a", package / "include" / "osqp"
-    if not library.exists() or not headers.is_dir():
-        raise ExportError(f"this build of casadi has no static OSQP library in {package}; install casadi from PyPI")
-    shutil.copy(library, folder)
-    shutil.copytree(headers, folder / "include" / "osqp", dirs_exist_ok=True)
+def _facts(record: ControllerRecord, kind: _Kind, given: Tables) -> dict[str, Any]:
+    mpc = record.mpc
+    program = {f"qp_{array}": values for array, values in given.program.arrays.items()}
+    arrays = {array: values for array, values in given.arrays.items() if values.size}
+    share = _SHARE[kind.real]
+    return {
+        "title": "Model predictive controller tuned by socasadi",
+        "mark": _MARK,
+        "provenance": [*record.provenance, f"{_MARK} {importlib.metadata.version('socasadi')}"],
+        "name": kind.name,
+        "NAME": kind.name.upper(),
+        "real": kind.real,
+        "solver": kind.solver,
+        "sample_time": mpc.sample_time,
+        "horizon": mpc.horizon,
+        "input_bounds": mpc.input_bounds,
+        "rate_bounds": mpc.rate_bounds,
+        **given.sizes,
+        **given.limits,
+        "rows": given.program.rows,
+        "iterations": given.program.iterations,
+        "tables": list((arrays | program).items()),
+        "arrays": list(arrays),
+        "program": list(given.program.arrays),
+        "table_numbers": sum(values.size for values in (arrays | program).values()),
+        "samples": len(record.output),
+        "replay_tolerance": share,
+        "scale": mpc.input_scale,
+        "held": record.held,
+        "output": record.output,
+        "reference": record.preview.reshape(len(record.output), -1),
+        "disturbance": record.disturbance,
+        "input": expected_inputs(record),
+    }
 
 
-def _versions() -> list[str]:
-    names = ("socasadi", "casadi")
-    return ["made with " + ", ".join(f"{name} {importlib.metadata.version(name)}" for name in names)]
-
-
-def _template(name: str) -> jinja2.Template:
+def _environment(real: str) -> jinja2.Environment:
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("socasadi.export"), keep_trailing_newline=True, undefined=jinja2.StrictUndefined
+        loader=jinja2.PackageLoader("socasadi.export"),
+        keep_trailing_newline=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=False,
     )
-    environment.filters["c"] = _initialiser
-    return environment.get_template(name)
+    suffix = "f" if real == "float" else ""
 
+    def number(value: float) -> str:
+        """A literal that reads back as the very same number."""
+        text = str(np.float32(value)) if real == "float" else repr(float(value))
+        return (text if any(sign in text for sign in ".en") else f"{text}.0") + suffix
 
-def _initialiser(array: Sequence | np.ndarray) -> str:
-    """A C initialiser that reads back as the very same doubles."""
-    values = np.asarray(array, dtype=float)
-    if values.ndim == 1:
-        return "{" + ", ".join(repr(float(value)) for value in values) + "}"
-    return "{\n    " + ",\n    ".join(_initialiser(row) for row in values) + "}"
+    def initialiser(array: Sequence | np.ndarray) -> str:
+        values = np.asarray(array, dtype=float)
+        if values.ndim > 1:
+            return "{\n    " + ",\n    ".join(initialiser(row) for row in values) + "}"
+        lines = [", ".join(map(number, values[i : i + 8])) for i in range(0, len(values), 8)]
+        return "{" + ",\n    ".join(lines) + "}"
+
+    environment.filters |= {"c": initialiser, "number": number}
+    return environment
