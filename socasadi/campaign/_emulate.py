@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from ..export import Emulated, EmulatorError, Footprint, build, core_for, export, toolchain
+from ..mpc import Real, check_real
 from ._episode import Episode, fly
 from ._result import Result, RunError
 
@@ -35,7 +36,7 @@ class ProcessorInTheLoop:
     difference: float
 
 
-def emulate(result: Result, *, real: str = "float") -> ProcessorInTheLoop:
+def emulate(result: Result, *, real: Real = "float") -> ProcessorInTheLoop:
     """Fly the best controller of a run on an emulated microcontroller: Cortex-M4F in float, Cortex-M7 in double.
 
     The figures are kept in microcontroller-REAL.json in the run folder.
@@ -49,6 +50,7 @@ def emulate(result: Result, *, real: str = "float") -> ProcessorInTheLoop:
     RunError
         The episode failed.
     """
+    check_real(real)
     if reason := toolchain():
         raise EmulatorError(reason)
     study, core = result.study, core_for(real)
@@ -61,8 +63,8 @@ def emulate(result: Result, *, real: str = "float") -> ProcessorInTheLoop:
             if episode.failure is not None:
                 raise RunError(f"the episode with the emulated {core.name} failed: {episode.failure}")
             footprint = emulated.footprint
-    here = fly(study.plant, mpc.controller(theta, real=core.real), study.task, **settings)
+    here = fly(study.plant, mpc.controller(theta, real=real), study.task, **settings)
     difference = float(np.max(np.abs(episode.tension - here.tension) / mpc.input_scale))
-    kept = {"core": core.name, "real": core.real, "difference": difference, **asdict(footprint)}
+    kept = {"core": core.name, "real": real, "difference": difference, **asdict(footprint)}
     (result.folder / f"microcontroller-{real}.json").write_text(json.dumps(kept, indent=2) + "\n")
-    return ProcessorInTheLoop(core.name, core.real, episode, footprint, difference)
+    return ProcessorInTheLoop(core.name, real, episode, footprint, difference)

@@ -26,8 +26,8 @@ def expected_inputs(record: ControllerRecord) -> np.ndarray:
 def check_single_precision(record: ControllerRecord) -> float:
     """Compare float with double on the recorded episode and on random states, and return the largest difference.
 
-    Each of the random samples starts from rest under random inputs, and has a random measurement, reference and measured
-    disturbance, as large as the bounds allow or as they are in the episode, whichever is more.
+    Each of the random samples starts from rest under random inputs, and has a random measurement, reference and
+    measured disturbance, as large as the bounds allow or as they are in the episode, whichever is more.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def check_single_precision(record: ControllerRecord) -> float:
     rng = np.random.default_rng(0)
     lower, upper = mpc.input_limits
     output, wanted, disturbance = (
-        np.abs(values).max(initial=0.0) for values in (record.output, record.preview, record.disturbance)
+        max(np.abs(values).max(initial=0.0) for values in each) for each in zip(*record.samples(), strict=True)
     )
     if mpc.output_limits is not None:
         output = max(output, mpc.largest_output_bound)

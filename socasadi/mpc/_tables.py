@@ -42,7 +42,8 @@ class Tables:
     sizes, limits
         Its integers and its numbers.
     arrays
-        Its arrays, flat, in the order in which C reads them. Without rate bounds there is no ``slowest``, no ``fastest``.
+        Its arrays, flat, in the order in which C reads them; ``slowest`` and ``fastest`` only where there are rate
+        bounds.
     program
         Its quadratic program.
     """
