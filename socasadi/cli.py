@@ -33,7 +33,7 @@ from .campaign import (
     progress_line,
 )
 from .codegen import CompilationError
-from .export import EmulatorError, ExportError, NotBuiltError, build_and_replay
+from .export import ExportError, NotBuiltError, build_and_replay
 from .report import figures, save_figures
 
 app = typer.Typer(
@@ -127,7 +127,7 @@ def emulate_(
 ) -> None:
     """Fly the best controller of a run on an emulated microcontroller, and say what it costs there."""
     with out.status("flying with the controller on an emulated microcontroller"):
-        flown = emulate(Result.open(run_folder), real=real)
+        flown = emulate(Result.open(run_folder), real=real)  # pyright: ignore[reportArgumentType] (checked there)
     figures, seconds = flown.footprint, len(flown.episode.tension) * flown.episode.sample_time
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     table.add_row("processor", f"{flown.core}, {flown.real} (emulated)")
@@ -151,7 +151,6 @@ def main() -> None:
         RunError,
         JournalError,
         ExportError,
-        EmulatorError,
         CompilationError,
         ValueError,
         TypeError,
