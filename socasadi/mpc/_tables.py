@@ -79,7 +79,9 @@ def tables(mpc: "LinearMPC", design: Design, real: Real = "double") -> Tables:
         "upper": upper,
     }
     if mpc.rate_limits is not None:
-        arrays["slowest"], arrays["fastest"] = (_finite(limit * mpc.sample_time) for limit in mpc.rate_limits)
+        arrays["slowest"], arrays["fastest"] = (
+            _finite(limit * mpc.sample_time / mpc.input_scale) for limit in mpc.rate_limits
+        )
     return Tables(
         sizes={name: getattr(design, name) for name in ("order", "inputs", "outputs", "disturbances", "preview")},
         limits={"tolerance": KKT_TOLERANCES[real], "plausible": float(design.plausible)},

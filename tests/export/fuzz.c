@@ -94,8 +94,8 @@ int main(int count, char **arguments) {
 #ifdef RATED
             /* Adding a bound to the input before may round. */
             if (known)
-                hasty += !(u[i] - before[i] >= controller_slowest[i] * REAL(1.00001) &&
-                           u[i] - before[i] <= controller_fastest[i] * REAL(1.00001));
+                hasty += !(u[i] - before[i] >= controller_slowest[i] * controller_scale[i] * REAL(1.00001) &&
+                           u[i] - before[i] <= controller_fastest[i] * controller_scale[i] * REAL(1.00001));
 #endif
             before[i] = u[i];
         }

@@ -96,15 +96,13 @@ static void centre(mpc *self, const real *reference) {
     }
 }
 
-/* Writes the input that the quadratic program asks for, as far as it can be believed, to v: an enum mpc_status. */
+/* Writes the input that the quadratic program asks for, as far as it can be believed, to v: an enum mpc_status. What is
+ * not finite, be it in the reference, comes out of the program as a residual that is not believed. */
 static int decide(mpc *self, const real *reference, real *v) {
     const mpc_data *data = self->data;
     const int m = data->inputs;
     int i;
-    copy(v, self->v, m);
-    if (!all_finite(reference, data->preview * data->outputs)) return MPC_HELD;
     centre(self, reference);
-    if (!all_finite(self->centre, data->qp.rows)) return MPC_HELD;
     qp_solve(&self->solver, self->centre);
     self->info.iterations = self->solver.iterations;
     self->info.residual = qp_residual(&self->solver, self->centre);
@@ -115,7 +113,9 @@ static int decide(mpc *self, const real *reference, real *v) {
     /* A working set that led nowhere is not to be started from. */
     qp_reset(&self->solver);
     for (i = 0; i < m; ++i) v[i] = self->centre[i] * data->qp.unit[i];
-    return MPC_CLIPPED;
+    if (all_finite(v, m)) return MPC_CLIPPED;
+    copy(v, self->v, m);
+    return MPC_HELD;
 }
 
 static void count(mpc_info *info, int status) {
@@ -156,21 +156,21 @@ void mpc_reset(mpc *self, const real *u_before) {
 int mpc_step(mpc *self, const real *y, const real *reference, const real *w, real *u) {
     const mpc_data *data = self->data;
     const int m = data->inputs;
+    /* The first rows of the program are the input, so that their bounds are those of v. */
+    const real *unit = data->qp.unit, *lower = data->qp.lower, *upper = data->qp.upper;
     int i, status;
     self->info.iterations = 0;
-    self->info.residual = REAL_MAX;
     observe(self, y);
     for (i = 0; i < data->disturbances; ++i)
         if (real_finite(w[i])) self->w[i] = w[i];
-    for (i = 0; i < m; ++i)
-        self->v[i] = real_clip(self->v[i], data->lower[i] / data->scale[i], data->upper[i] / data->scale[i]);
+    for (i = 0; i < m; ++i) self->v[i] = real_clip(self->v[i], lower[i] * unit[i], upper[i] * unit[i]);
     status = decide(self, reference, u);
     for (i = 0; i < m; ++i) {
-        const real before = real_clip(self->v[i] * data->scale[i], data->lower[i], data->upper[i]);
-        u[i] *= data->scale[i];
-        if (data->slowest) u[i] = real_clip(u[i], before + data->slowest[i], before + data->fastest[i]);
-        u[i] = real_clip(u[i], data->lower[i], data->upper[i]);
-        self->v[i] = u[i] / data->scale[i];
+        real v = u[i];
+        if (data->slowest) v = real_clip(v, self->v[i] + data->slowest[i], self->v[i] + data->fastest[i]);
+        self->v[i] = real_clip(v, lower[i] * unit[i], upper[i] * unit[i]);
+        /* Scaling back can round across a bound. */
+        u[i] = real_clip(self->v[i] * data->scale[i], data->lower[i], data->upper[i]);
     }
     count(&self->info, status);
     return status;

@@ -29,7 +29,7 @@ typedef struct {
     const real *rest; /* order x inputs: x at rest under a constant v */
     const real *map;  /* (order + inputs + preview outputs + disturbances + 1) columns of qp.rows */
     const real *scale, *lower, *upper; /* inputs: of u, in its own unit */
-    const real *slowest, *fastest;     /* inputs: bounds of the change of u in a sample; null: none */
+    const real *slowest, *fastest;     /* inputs: bounds of the change of v in a sample; null: none */
     qp_problem qp;
 } mpc_data;
 
