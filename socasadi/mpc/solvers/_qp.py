@@ -21,8 +21,8 @@ _OPTIONS: dict[str, dict] = {
         "warm_start_dual": False,
         "osqp": {
             "verbose": False,
-            "eps_abs": 1e-9,
-            "eps_rel": 1e-9,
+            "eps_abs": 1e-11,
+            "eps_rel": 1e-11,
             "max_iter": 20_000,
             "adaptive_rho_interval": 50,
         },
