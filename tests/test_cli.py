@@ -202,9 +202,10 @@ def test_a_run_folder_that_exists_needs_resume_and_the_same_settings(finished):
 
 
 def test_what_the_readme_shows_of_python_runs(tmp_path):
-    code, rod = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
-    run = subprocess.run([sys.executable, "-c", rod], cwd=tmp_path, capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
+    code, rod, mpc = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+    for block in (rod, mpc):
+        run = subprocess.run([sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True)
+        assert run.returncode == 0, run.stderr
     assert "casadi_real" in (tmp_path / "rhs.c").read_text()
     short = code.replace("iterations=20", "iterations=1, seed_points=2")
     assert short != code

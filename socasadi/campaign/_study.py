@@ -81,7 +81,8 @@ class Study:
         ):
             if of_plant != of_mpc:
                 raise ValueError(f"{name} of the plant is {of_plant}, but {of_mpc} of the MPC; make them equal")
-        if mpc.measured_disturbances and not hasattr(plant, "disturbance"):
+        # Looked for in the class, too: it need not have a value before the first reset.
+        if mpc.measured_disturbances and not (hasattr(type(plant), "disturbance") or hasattr(plant, "disturbance")):
             raise ValueError(
                 f"the MPC has {mpc.measured_disturbances} measured disturbances, but the plant has no `disturbance`"
             )

@@ -33,6 +33,8 @@ def check_settings(mpc: "LinearMPC") -> None:
             f"measured_disturbances is how many of the model's {mpc.model.inputs} inputs are measured and not "
             f"tensions, at least one less than all, not {mpc.measured_disturbances!r}"
         )
+    if mpc.iteration_limit is not None and not _is_count(mpc.iteration_limit, 1):
+        raise ValueError(f"iteration_limit is a positive number of iterations or None, not {mpc.iteration_limit!r}")
     check_input_term(mpc.input_term)
     check_backend(mpc.backend)
     if mpc.terminal not in ("riccati", None):

@@ -99,6 +99,9 @@ class LinearMPC:
         delayed.
     backend
         QP solver: ``"active-set"``, the project's own, compiled; ``"daqp"``, ``"qpoases"`` or ``"osqp"``.
+    iteration_limit
+        Changes of the working set after which ``"active-set"`` gives a sample up to the clipped unconstrained law: it
+        bounds the time of a step. None: 50, and two more a constraint.
 
     Raises
     ------
@@ -128,6 +131,7 @@ class LinearMPC:
     disturbance_model: Literal["output", "input"] = "output"
     measured_disturbances: int = 0
     delay: int = 0
+    iteration_limit: int | None = None
 
     def __post_init__(self) -> None:
         check_settings(self)

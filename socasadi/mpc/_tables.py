@@ -54,7 +54,7 @@ class Tables:
     program: ProgramTables
 
 
-def program_tables(dual: DualProgram) -> ProgramTables:
+def program_tables(dual: DualProgram, iteration_limit: int | None = None) -> ProgramTables:
     """The tables of one quadratic program."""
     rows = len(dual.unit)
     arrays = {
@@ -65,7 +65,8 @@ def program_tables(dual: DualProgram) -> ProgramTables:
         "price": dual.price,
         "unit": dual.unit,
     }
-    return ProgramTables(rows, 50 + 2 * rows, arrays)
+    # Random problems with many active bounds took up to two changes a row, tracking problems seldom one.
+    return ProgramTables(rows, iteration_limit or 50 + 2 * rows, arrays)
 
 
 def tables(mpc: "LinearMPC", design: Design, real: Real = "double") -> Tables:
@@ -86,7 +87,7 @@ def tables(mpc: "LinearMPC", design: Design, real: Real = "double") -> Tables:
         sizes={name: getattr(design, name) for name in ("order", "inputs", "outputs", "disturbances", "preview")},
         limits={"tolerance": KKT_TOLERANCES[real], "plausible": float(design.plausible)},
         arrays={name: np.ravel(array) for name, array in arrays.items()},
-        program=program_tables(design.dual),
+        program=program_tables(design.dual, mpc.iteration_limit),
     )
 
 

@@ -7,7 +7,7 @@ from ._loop import decays
 if TYPE_CHECKING:
     from .._spec import LinearMPC
 
-_BOOK = "Rawlings, Mayne, Diehl, Model Predictive Control, 2nd ed., sections 2.4 to 2.6"
+_BOOK = "Rawlings, Mayne, Diehl, Model Predictive Control, 2nd ed., chapter 2"
 
 
 def established(
