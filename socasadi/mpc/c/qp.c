@@ -195,11 +195,22 @@ static void correct(qp *self) {
     for (k = 0; k < self->active; ++k) self->multiplier[self->row[k]] += x[k];
 }
 
+/* Empties the working set. */
+static void forget(qp *self) {
+    int i;
+    self->active = 0;
+    for (i = 0; i < self->problem->rows; ++i) {
+        self->state[i] = INACTIVE;
+        self->multiplier[i] = REAL(0.0);
+    }
+}
+
 /* Multipliers of the last working set for new centres. Those that fall out of their range change or leave, the
  * farthest first, until none does; when that takes too long the working set is given up. */
 static void warm_start(qp *self, const real *centre) {
     const qp_problem *problem = self->problem;
-    int left = 2 * self->active, k;
+    int patience = 2 * self->active, k;
+    if (patience > problem->iterations) patience = problem->iterations;
     while (self->active > 0) {
         real farthest = REAL(0.0);
         int worst = -1, upper = 0;
@@ -221,8 +232,8 @@ static void warm_start(qp *self, const real *centre) {
             }
         }
         if (worst < 0) break;
-        if (left-- == 0) {
-            qp_reset(self);
+        if (self->iterations >= patience) {
+            forget(self);
             break;
         }
         self->iterations += 1;
@@ -290,10 +301,11 @@ static int join(qp *self, int j, int at) {
     int state = at * (soft && !(problem->price[j] > REAL(0.0)) ? SLACK : TIGHT), k;
     real beyond = (real)at * (self->value[j] - bound(problem, j, state)), size = REAL(0.0);
 
-    while (self->iterations++ < problem->iterations) {
+    while (self->iterations < problem->iterations) {
         const real slope = extend(self, j, state), *entries = factor_row(self, self->active);
         const real full = slope > DEPENDENT ? beyond / slope : REAL_MAX, turn = range_to(problem, j, state) - size;
         halt stop;
+        self->iterations += 1;
         for (k = 0; k < self->active; ++k) self->direction[k] = entries[k];
         solve_transposed(self, self->direction);
         stop = first_halt(self, at, full < turn ? full : turn);
@@ -329,13 +341,8 @@ void qp_init(qp *self, const qp_problem *problem, real *reals, int *ints) {
 }
 
 void qp_reset(qp *self) {
-    int i;
-    self->active = 0;
+    forget(self);
     self->iterations = 0;
-    for (i = 0; i < self->problem->rows; ++i) {
-        self->state[i] = INACTIVE;
-        self->multiplier[i] = REAL(0.0);
-    }
 }
 
 int qp_solve(qp *self, const real *centre) {

@@ -4,7 +4,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._library import library
-from .._tables import Real, program_tables
+from .._tables import KKT_TOLERANCES, Real, program_tables
 from ..formulation import DualProgram
 
 
@@ -23,7 +23,7 @@ class RowAnswer(NamedTuple):
 class ActiveSet:
     """The dual active-set solver in C (see qp.h), for programs that differ in their parameters only.
 
-    Each solution starts from the working set of the one before.
+    Each solution starts from the working set of the one before, if that was good.
 
     Raises
     ------
@@ -32,7 +32,7 @@ class ActiveSet:
     """
 
     def __init__(self, dual: DualProgram, real: Real = "double") -> None:
-        self._dual, self._library = dual, library(real)
+        self._dual, self._real, self._library = dual, real, library(real)
         c, number, pointer = self._library.c, self._library.dtype, self._library.pointer
         self._problem, self._kept = self._library.program(program_tables(dual))
         problem = ctypes.byref(self._problem)
@@ -53,6 +53,6 @@ class ActiveSet:
         residual = float(self._library.c.qp_residual(itself, given))
         values, multipliers = self._reals[:rows].astype(float), self._reals[rows : 2 * rows].astype(float)
         answer = RowAnswer(values * self._dual.unit, multipliers / self._dual.unit, residual, self._self.iterations)
-        if not np.isfinite(residual) or residual >= np.finfo(self._library.dtype).max:
+        if not residual <= KKT_TOLERANCES[self._real]:
             self.forget()
         return answer
