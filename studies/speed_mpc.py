@@ -112,6 +112,9 @@ def main() -> None:
     parser.add_argument("--only", default="", help="only solvers whose name has this in it")
     parser.add_argument("--figure", action="store_true", help="also how time and memory grow, as a figure")
     chosen = parser.parse_args()
+    if not any(chosen.only.lower() in entry.name.lower() for entry in ENTRIES):
+        names = "\n  ".join(entry.name for entry in ENTRIES)
+        parser.exit(2, f"--only: no solver has {chosen.only!r} in its name; there are\n  {names}\n")
     print(versions())
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     with tempfile.TemporaryDirectory() as folder:

@@ -187,6 +187,14 @@ def test_single_precision_that_differs_too_much_is_refused_with_the_reason(tmp_p
     assert check_single_precision(record(LinearMPC(Modal()))) < 1e-4
 
 
+@with_compiler
+def test_flags_that_would_remove_the_checks_do_not_compile(folder):
+    command = [*(c_compiler() or []), "-std=c99", "-O2", "-ffast-math", "-c", "mpc.c", "-o", "object.o"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode != 0
+    assert "compile without -ffast-math" in done.stderr
+
+
 def test_the_header_says_where_the_controller_comes_from(folder):
     header = (folder / "controller_data.h").read_text()
     assert " * a test\n" in header
@@ -217,6 +225,8 @@ def test_the_readme_says_what_it_costs(folder):
         ({"solver": "qrqp"}, "unknown solver 'qrqp'; there are active-set, osqp"),
         ({"name": "My arm"}, "the name 'My arm' does not do for C"),
         ({"name": "mpc"}, "the name 'mpc' does not do for C"),
+        ({"name": "float"}, "the name 'float' does not do for C"),
+        ({"name": "vectors"}, "the name 'vectors' does not do for C"),
     ],
 )
 def test_what_cannot_be_exported_is_said(tmp_path, asked, said):

@@ -16,15 +16,20 @@
 enum {
     INACTIVE = 0, /* multiplier 0 */
     TIGHT = 1,    /* the row is at its bound; of a soft row, the multiplier is not above its price */
-    SLACK = 2     /* of soft rows: the bound is exceeded by softness (multiplier - price) */
+    SLACK = 2,    /* of soft rows: the bound is exceeded by softness (multiplier - price) */
+    NEGLECTED = 3 /* multiplier 0: exceeds its bound by next to nothing, and cannot join for others that it hangs on */
 };
 
 #ifdef REAL_FLOAT
-#define TOLERANCE 2e-6f
-#define DEPENDENT 1e-5f
+#define TOLERANCE 2e-6f  /* of a row, relative to the largest centre */
+#define NEXT_TO_NOTHING 2e-5f
+#define DEPENDENT 1e-5f  /* of a row of unit length, the square of what is left of it beside the working set */
+#define NO_DIRECTION 1e-3f
 #else
 #define TOLERANCE 1e-11
+#define NEXT_TO_NOTHING 1e-7
 #define DEPENDENT 1e-11
+#define NO_DIRECTION 3e-6
 #endif
 
 static int side(int state) { return state < 0 ? -1 : 1; }
@@ -271,8 +276,9 @@ typedef struct {
     int upper; /* whether that is the upper end */
 } halt;
 
-/* While the multiplier of a row grows outwards from its bound `at`, those of the working set move along `direction`. */
-static halt first_halt(const qp *self, int at, real length) {
+/* While the multiplier of a row grows outwards from its bound `at`, those of the working set move along `direction`;
+ * what moves at less than the least pace does not move. */
+static halt first_halt(const qp *self, int at, real length, real least) {
     halt found = {0};
     int k;
     found.length = length;
@@ -285,7 +291,7 @@ static halt first_halt(const qp *self, int at, real length) {
         real room = grows ? range_to(self->problem, i, self->state[i]) - size
                           : size - range_from(self->problem, i, self->state[i]);
         if (room < REAL(0.0)) room = REAL(0.0);
-        if (room < REAL_MAX && room < pace * found.length) {
+        if (pace > least && room < REAL_MAX && room < pace * found.length) {
             found.length = room / pace;
             found.first = k;
             found.upper = grows;
@@ -303,12 +309,13 @@ static int join(qp *self, int j, int at) {
 
     while (self->iterations < problem->iterations) {
         const real slope = extend(self, j, state), *entries = factor_row(self, self->active);
-        const real full = slope > DEPENDENT ? beyond / slope : REAL_MAX, turn = range_to(problem, j, state) - size;
+        const int joins = slope > DEPENDENT;
+        const real full = joins ? beyond / slope : REAL_MAX, turn = range_to(problem, j, state) - size;
         halt stop;
         self->iterations += 1;
         for (k = 0; k < self->active; ++k) self->direction[k] = entries[k];
         solve_transposed(self, self->direction);
-        stop = first_halt(self, at, full < turn ? full : turn);
+        stop = first_halt(self, at, full < turn ? full : turn, joins ? REAL(0.0) : NO_DIRECTION);
         if (stop.length >= REAL_MAX) return QP_INFEASIBLE;
         for (k = 0; k < self->active; ++k)
             self->multiplier[self->row[k]] -= (real)at * stop.length * self->direction[k];
@@ -346,13 +353,14 @@ void qp_reset(qp *self) {
 }
 
 int qp_solve(qp *self, const real *centre) {
-    real tolerance = REAL(1.0);
+    real scale = REAL(1.0), tolerance;
     int corrections = 2, i;
     for (i = 0; i < self->problem->rows; ++i) {
         const real size = real_abs(centre[i]);
-        if (size > tolerance) tolerance = size;
+        if (size > scale) scale = size;
+        if (self->state[i] == NEGLECTED) self->state[i] = INACTIVE;
     }
-    tolerance *= TOLERANCE;
+    tolerance = TOLERANCE * scale;
     self->iterations = 0;
     warm_start(self, centre);
     for (;;) {
@@ -362,8 +370,13 @@ int qp_solve(qp *self, const real *centre) {
             if (largest_excess(self) <= tolerance || corrections-- == 0) return QP_OPTIMAL;
             correct(self);
         } else {
+            const real value = self->value[j];
+            const real beyond = at > 0 ? value - self->problem->upper[j] : self->problem->lower[j] - value;
             const int status = join(self, j, at);
-            if (status != QP_OPTIMAL) return status;
+            if (status == QP_INFEASIBLE && beyond <= NEXT_TO_NOTHING * scale)
+                self->state[j] = NEGLECTED;
+            else if (status != QP_OPTIMAL)
+                return status;
         }
         update_value(self, centre);
     }

@@ -4,6 +4,10 @@
 
 #include <float.h>
 
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error "the checks rely on NaN and infinities: compile without -ffast-math and -ffinite-math-only"
+#endif
+
 #ifdef REAL_FLOAT
 typedef float real;
 #define REAL_MAX FLT_MAX
