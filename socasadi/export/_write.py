@@ -30,84 +30,14 @@ _TEMPLATES = {
 _MARK = "Made by socasadi"
 
 
-# Names that mean something in C or C++, or in the exported files.
-_TAKEN = frozenset(
-    [
-        "auto",
-        "break",
-        "case",
-        "char",
-        "const",
-        "continue",
-        "default",
-        "do",
-        "double",
-        "else",
-        "enum",
-        "extern",
-        "float",
-        "for",
-        "goto",
-        "if",
-        "inline",
-        "int",
-        "long",
-        "register",
-        "restrict",
-        "return",
-        "short",
-        "signed",
-        "sizeof",
-        "static",
-        "struct",
-        "switch",
-        "typedef",
-        "union",
-        "unsigned",
-        "void",
-        "volatile",
-        "while",
-        "main",
-        "bool",
-        "catch",
-        "class",
-        "delete",
-        "explicit",
-        "export",
-        "false",
-        "friend",
-        "mutable",
-        "namespace",
-        "new",
-        "operator",
-        "private",
-        "protected",
-        "public",
-        "template",
-        "this",
-        "throw",
-        "true",
-        "try",
-        "typename",
-        "using",
-        "virtual",
-        "mpc",
-        "mpc_data",
-        "mpc_info",
-        "qp",
-        "qp_problem",
-        "real",
-        "self",
-        "data",
-        "vectors",
-        "replay",
-        "example",
-        "u",
-        "y",
-        "r",
-        "w",
-    ]
-)
+_TAKEN = """
+auto break case char const continue default do double else enum extern float for goto if inline int long register
+restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
+bool catch class delete explicit export false friend mutable namespace new operator private protected public template
+this throw true try typename using virtual
+mpc mpc_data mpc_info qp qp_problem real self data vectors replay example u y r w
+"""
+"""Names that mean something in C, in C++ or in the exported files."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +55,7 @@ class _Kind:
             raise ExportError(str(error)) from None
         if self.solver not in SOLVERS:
             raise ExportError(f"unknown solver {self.solver!r}; there are {', '.join(SOLVERS)}")
-        if not re.fullmatch(r"[a-z][a-z0-9_]*", self.name) or self.name in _TAKEN:
+        if not re.fullmatch(r"[a-z][a-z0-9_]*", self.name) or self.name in _TAKEN.split():
             raise ExportError(
                 f"the name {self.name!r} does not do for C: small letters, digits and _, no word of the language and "
                 "none that the export's own files use, such as mpc or data"

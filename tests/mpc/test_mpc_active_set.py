@@ -347,6 +347,23 @@ def test_as_many_iterations_are_allowed_as_the_cap_says_and_none_more(c):
     assert len(counts) > 4
 
 
+@pytest.mark.parametrize("cap", range(6))
+def test_from_any_working_set_the_cap_holds_and_what_is_called_optimal_is(c, cap):
+    rng, counts = np.random.default_rng(10), np.zeros(3, int)
+    for _ in range(10):
+        program = random_rows(rng)
+        centres = centres_of(rng, program, 100)
+        answer = in_turn(c, program, centres, cap)
+        counts += np.bincount(answer.status, minlength=3)
+        assert (answer.iterations <= cap).all()
+        assert (answer.iterations[answer.status == CAPPED] == cap).all()
+        for t in np.flatnonzero(answer.status == OPTIMAL):
+            assert broken(program, centres[t], answer.multipliers[t]) < 1e-9 * (1 + np.abs(centres[t]).max())
+    assert counts[INFEASIBLE] == 0
+    assert counts[CAPPED] > 10
+    assert counts[OPTIMAL] > 10
+
+
 def test_one_row_takes_one_iteration_and_one_more_where_it_turns_soft_at_its_price(c):
     centres = np.array([[1.0], [4.0], [40.0], [40.0], [4.0], [0.0]])
     hard, soft, priced = (
@@ -356,6 +373,8 @@ def test_one_row_takes_one_iteration_and_one_more_where_it_turns_soft_at_its_pri
     assert priced == [0, 1, 2, 2, 1, 0]
     # From the working set of the one before: joins, turns, stays, turns back, leaves.
     assert in_turn(c, one_row(0.5, 6.0), centres).iterations.tolist() == [0, 1, 1, 0, 1, 1]
+    assert in_turn(c, one_row(0.5, 0.0), centres).iterations.tolist() == [0, 1, 0, 0, 0, 1]
+    assert in_turn(c, one_row(0.0, 0.0), centres).iterations.tolist() == [0, 1, 0, 0, 0, 1]
 
 
 @pytest.mark.parametrize("hole", [np.nan, 1e308, -1e308])
@@ -543,7 +562,9 @@ def test_controllers_side_by_side_do_not_disturb_each_other():
         assert alone.info == together[k].info
 
 
-@pytest.mark.parametrize("settings", [{}, {"rate_bounds": (-60, 60)}, {"slack_linear": 100.0}, {"input_bounds": (0, 10)}])
+@pytest.mark.parametrize(
+    "settings", [{}, {"rate_bounds": (-60, 60)}, {"slack_linear": 100.0}, {"input_bounds": (0, 10)}]
+)
 def test_single_precision_follows_double_within_a_ten_thousandth_of_the_bound(settings):
     """On a hundred ordinary problems, one after the other and each from rest."""
     mpc = replace(LinearMPC(Modal(), output_bounds=(-0.05, 0.05)), **settings)
