@@ -128,17 +128,19 @@ def emulate_(
     """Fly the best controller of a run on an emulated microcontroller, and say what it costs there."""
     with out.status("flying with the controller on an emulated microcontroller"):
         flown = emulate(Result.open(run_folder), real=real)  # pyright: ignore[reportArgumentType] (checked there)
-    figures, seconds = flown.footprint, len(flown.episode.tension) * flown.episode.sample_time
+    footprint, worst = flown.footprint, flown.worst
+    seconds = len(flown.episode.tension) * flown.episode.sample_time
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     table.add_row("processor", f"{flown.core}, {flown.real} (emulated)")
     table.add_row("episode", f"{seconds:g} s, {flown.episode.fallbacks} fallbacks")
     table.add_row("inputs against the same C here", f"{flown.difference:.1e} of the bound at most")
-    table.add_row(
-        "flash, RAM, stack", f"{figures.flash / 1000:.1f} kB, {figures.ram / 1000:.1f} kB, {figures.stack} bytes"
-    )
-    table.add_row(
-        "instructions a step", f"{figures.instructions_median:,} in the median, {figures.instructions_worst:,} at worst"
-    )
+    table.add_row("flash, RAM, stack", f"{worst.flash / 1e3:.1f} kB, {worst.ram / 1e3:.1f} kB, {worst.stack} bytes")
+    for name, of in (("of the episode", footprint), ("random samples, too", worst)):
+        table.add_row(
+            f"instructions a step, {name}",
+            f"{of.instructions_median:,} in the median, {of.instructions_worst:,} at worst "
+            f"({of.iterations_worst} iterations)",
+        )
     out.print(table)
 
 

@@ -48,7 +48,7 @@ def tracking(core: Core, *, checked: bool, warm: bool) -> None:
     if core.real == "float":
         tables = re.sub(r"(?<=[{,\s])(-?\d[\d.]*(?:e[-+]?\d+)?)(?=[,}\s])", r"\1f", tables)
     with TemporaryDirectory() as folder:
-        for file in ("real.h", "qp.h", "qp.c"):
+        for file in ("real.h", "qp.h", "qp.c", "qp_residual.c"):
             Path(folder, file).write_text((LIBRARY / file).read_text())
         for file, source in (("tracking.h", "mpc_firmware.h"), ("tracking.c", "mpc_firmware.c")):
             Path(folder, file).write_text((PEERS / source).read_text())

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from ..export import Emulated, EmulatorError, Footprint, build, core_for, export, toolchain
+from ..export import RANDOM_SAMPLES, Emulated, EmulatorError, Footprint, build, core_for, export, toolchain
 from ..mpc import Real, check_real
 from ._episode import Episode, fly
 from ._result import Result, RunError
@@ -23,7 +23,9 @@ class ProcessorInTheLoop:
     episode
         What the robot did.
     footprint
-        Flash, RAM, stack and instructions of the controller.
+        Flash, RAM, stack and instructions of the controller in this episode.
+    worst
+        The same over the episode and random samples, most of them with active bounds.
     difference
         Largest difference between its inputs and those that the same C gives in the same episode flown with a
         controller compiled for this machine, as a share of the input bound.
@@ -33,6 +35,7 @@ class ProcessorInTheLoop:
     real: str
     episode: Episode
     footprint: Footprint
+    worst: Footprint
     difference: float
 
 
@@ -56,15 +59,24 @@ def emulate(result: Result, *, real: Real = "float") -> ProcessorInTheLoop:
     study, core = result.study, core_for(real)
     theta, mpc = result.best.theta, replace(study.mpc, backend="active-set")
     settings = {"seed": study.seed, "time_limit": max(study.time_limit, 600.0)}
+    record = result.controller_record()
     with tempfile.TemporaryDirectory() as folder:
-        export(result.controller_record(), folder, real=real, figures=False)
+        export(record, folder, real=real, figures=False)
         with Emulated(build(folder, core), mpc) as emulated:
             episode = fly(study.plant, emulated, study.task, **settings)
             if episode.failure is not None:
                 raise RunError(f"the episode with the emulated {core.name} failed: {episode.failure}")
             footprint = emulated.footprint
+            emulated.run_random(record.random_samples(RANDOM_SAMPLES))
+            worst = emulated.footprint
     here = fly(study.plant, mpc.controller(theta, real=real), study.task, **settings)
     difference = float(np.max(np.abs(episode.tension - here.tension) / mpc.input_scale))
-    kept = {"core": core.name, "real": real, "difference": difference, **asdict(footprint)}
+    kept = {
+        "core": core.name,
+        "real": real,
+        "difference": difference,
+        "episode": asdict(footprint),
+        "worst": asdict(worst),
+    }
     (result.folder / f"microcontroller-{real}.json").write_text(json.dumps(kept, indent=2) + "\n")
-    return ProcessorInTheLoop(core.name, real, episode, footprint, difference)
+    return ProcessorInTheLoop(core.name, real, episode, footprint, worst, difference)

@@ -3,13 +3,14 @@
 from ._accept import FLOAT_SHARE, check_single_precision
 from ._build import build_and_replay
 from ._errors import ExportError, NotBuiltError
-from ._figures import core_for
+from ._figures import RANDOM_SAMPLES, core_for
 from ._record import ControllerRecord
 from ._write import SOLVERS, export
 from .microcontroller import Core, Emulated, EmulatorError, Firmware, Footprint, build, toolchain
 
 __all__ = [
     "FLOAT_SHARE",
+    "RANDOM_SAMPLES",
     "SOLVERS",
     "ControllerRecord",
     "Core",

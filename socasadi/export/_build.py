@@ -1,6 +1,7 @@
 import shlex
 import shutil
 import subprocess
+import tempfile
 from pathlib import Path
 
 from ..codegen import c_compiler
@@ -8,7 +9,7 @@ from ._errors import ExportError, NotBuiltError
 
 
 def build_and_replay(folder: str | Path) -> str:
-    """Run ``make test`` in an exported folder and return what the replay printed.
+    """Run ``make test`` in a copy of an exported folder and return what the replay printed.
 
     Raises
     ------
@@ -23,13 +24,16 @@ def build_and_replay(folder: str | Path) -> str:
         raise NotBuiltError(
             f"the exported controller was not built: no {missing} found; run 'make test' in {folder} where there is one"
         )
-    run = subprocess.run(
-        ["make", "-s", f"CC={shlex.join(compiler)}", "test"],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        stdin=subprocess.DEVNULL,
-    )
+    with tempfile.TemporaryDirectory() as scratch:
+        # Objects of this machine have no place in what is taken to another.
+        copy = shutil.copytree(folder, Path(scratch) / "controller")
+        run = subprocess.run(
+            ["make", "-s", f"CC={shlex.join(compiler)}", "test"],
+            cwd=copy,
+            capture_output=True,
+            text=True,
+            stdin=subprocess.DEVNULL,
+        )
     if run.returncode:
         raise ExportError(f"'make test' failed in {folder}:\n{(run.stderr + run.stdout).strip()[-2000:]}")
     return run.stdout.strip()

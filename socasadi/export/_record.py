@@ -57,3 +57,31 @@ class ControllerRecord:
         """What :meth:`Controller.step` was given at each sample: output, preview, measured disturbance."""
         assert self.disturbance is not None
         return zip(self.output, self.preview, self.disturbance, strict=True)
+
+    def random_samples(
+        self, count: int
+    ) -> Iterator[tuple[np.ndarray | None, tuple[np.ndarray, np.ndarray, np.ndarray]]]:
+        """Samples that mostly run into the bounds, the same at every call, and what is done before each.
+
+        Yields tensions to rest under, from which the controller starts anew (every twentieth time) or None, and the
+        arguments of :meth:`Controller.step`. Measurements wander, references jump; they and the measured disturbances
+        are as large as the bounds allow or as they are in the episode, whichever is more.
+        """
+        random, mpc = np.random.default_rng(0), self.mpc
+        output, wanted, disturbance = (
+            max(np.abs(values).max(initial=0.0) for values in each) for each in zip(*self.samples(), strict=True)
+        )
+        if mpc.output_limits is not None:
+            output = max(output, mpc.largest_output_bound)
+        y, reference = np.zeros(mpc.outputs), np.zeros((mpc.reference_rows, mpc.outputs))
+        for i in range(count):
+            begins = i % 20 == 0
+            held = random.uniform(*mpc.input_limits) if begins else None
+            y = random.uniform(-output, output, mpc.outputs) if begins else 0.9 * y
+            y = y + 0.3 * output * random.normal(size=mpc.outputs)
+            if i % 5 == 0:
+                # A preview that jumps at random, or a reference that stays.
+                rows = mpc.reference_rows if i % 2 else 1
+                reference = random.uniform(-1, 1, (rows, mpc.outputs)) * max(wanted, output)
+                reference = np.resize(reference, (mpc.reference_rows, mpc.outputs))
+            yield held, (y, reference, random.uniform(-disturbance, disturbance, mpc.measured_disturbances))

@@ -11,7 +11,7 @@ import numpy as np
 from ..mpc import Tables, check_real, controller_sources, tables
 from ._accept import FLOAT_SHARE, check_single_precision, expected_inputs
 from ._errors import ExportError
-from ._figures import Figures, core_for, emulated_figures, host_figures
+from ._figures import RANDOM_SAMPLES, Figures, core_for, emulated_figures, host_figures
 from ._record import ControllerRecord
 from .osqp import osqp_adapter, write_osqp
 
@@ -35,9 +35,13 @@ auto break case char const continue default do double else enum extern float for
 restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
 bool catch class delete explicit export false friend mutable namespace new operator private protected public template
 this throw true try typename using virtual
-mpc mpc_data mpc_info qp qp_problem real self data vectors replay example u y r w
+mpc qp real self data vectors replay example u y r w main malloc free printf memset memcpy
 """
 """Names that mean something in C, in C++ or in the exported files."""
+
+
+_FUNCTIONS = ("mpc_init", "mpc_reset", "mpc_step", "qp_init", "qp_reset", "qp_solve", "qp_residual")
+"""What the controller's C defines for the linker."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,7 @@ class _Kind:
             raise ExportError(str(error)) from None
         if self.solver not in SOLVERS:
             raise ExportError(f"unknown solver {self.solver!r}; there are {', '.join(SOLVERS)}")
-        if not re.fullmatch(r"[a-z][a-z0-9_]*", self.name) or self.name in _TAKEN.split():
+        if not re.fullmatch(r"(?!mpc_|qp_|real_)[a-z][a-z0-9_]*", self.name) or self.name in _TAKEN.split():
             raise ExportError(
                 f"the name {self.name!r} does not do for C: small letters, digits and _, no word of the language and "
                 "none that the export's own files use, such as mpc or data"
@@ -82,7 +86,8 @@ def export(
     solver
         ``"active-set"``, the project's own, or ``"osqp"``, by OSQP's code generator (``pip install osqp``).
     name
-        Prefix of all that the C defines: two controllers of different names fit in one program.
+        Prefix of all that the C defines for the linker: controllers of different names fit in one program, except that
+        OSQP's own names have no prefix, so that only one may solve by it.
     figures
         Whether to build it, on this machine and, where the tools are installed, for an emulated microcontroller, for
         what its README says of size and speed.
@@ -137,14 +142,14 @@ def _figures(folder: Path, kind: _Kind, record: ControllerRecord, facts: dict[st
 
 
 def _library(kind: _Kind) -> dict[str, str]:
-    """The C that is the same for every controller, by file name."""
+    """The C that is the same for every controller, by file name, with what sets this export apart in real.h."""
     sources = controller_sources()
+    apart = [f"#define {function} {kind.name}_{function}" for function in _FUNCTIONS]
     if kind.real == "float":
-        # In the header itself, so that no file of a program can be compiled for the other type.
-        choice = (
-            "#ifndef REAL_FLOAT\n#define REAL_FLOAT /* as this controller was exported */\n#endif\n\n#include <float.h>"
-        )
-        sources["real.h"] = sources["real.h"].replace("#include <float.h>", choice)
+        apart += ["#ifndef REAL_FLOAT", "#define REAL_FLOAT", "#endif"]
+    before, after = sources["real.h"].split("#include <float.h>")
+    told = "/* This export's number type, and names of its own, so that it links beside others. */"
+    sources["real.h"] = "\n".join([f"{before}{told}", *apart, "", f"#include <float.h>{after}"])
     if kind.solver == "osqp":
         sources["qp.c"] = osqp_adapter()
     return sources
@@ -196,6 +201,7 @@ def _facts(record: ControllerRecord, kind: _Kind, given: Tables) -> dict[str, An
         "reference": record.preview.reshape(len(record.output), -1),
         "disturbance": record.disturbance,
         "input": expected_inputs(record),
+        "random_samples": RANDOM_SAMPLES,
     }
 
 

@@ -14,7 +14,7 @@ Real = Literal["double", "float"]
 _UNBOUNDED = 1e30
 """Stands for an infinite bound: single precision holds it, too."""
 
-KKT_TOLERANCES = {"double": 1e-6, "float": 1e-3}
+KKT_TOLERANCES = {"double": 1e-6, "float": 1e-2}
 """Largest KKT residual of an answer that is believed, in shares of the bounds, by the number type."""
 
 

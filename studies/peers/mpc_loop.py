@@ -84,7 +84,7 @@ def step_c(folder: Path, loop: Loop, *, warm: bool = True, placed: bool = False)
     text += table("data_back", back)
     define = ["PLACED"] if placed else []
     program = replace(loop.program, p=loop.seen)
-    sources = ["mpc_step.c", LIBRARY / "mpc.c", LIBRARY / "qp.c"]
+    sources = ["mpc_step.c", *(LIBRARY / f"{part}.c" for part in ("mpc", "qp", "qp_residual"))]
     executable = build(folder, program, sources, include=[LIBRARY], define=define, tables=text)
     return InC(folder, program, executable, warm)
 

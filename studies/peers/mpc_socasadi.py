@@ -15,7 +15,7 @@ LIBRARY = Path(str(find_spec("socasadi").origin)).parent / "mpc" / "c"  # pyrigh
 
 def socasadi_qp(folder: Path, program: Program, *, warm: bool, checked: bool) -> InC:
     """qp_solve for given centres, with its KKT check or without."""
-    sources = ["mpc_socasadi.c", LIBRARY / "qp.c"]
+    sources = ["mpc_socasadi.c", LIBRARY / "qp.c", LIBRARY / "qp_residual.c"]
     define = ["CHECKED"] if checked else []
     executable = build(folder, program, sources, include=[LIBRARY], define=define, tables=dual(program))
     return InC(folder, program, executable, warm)

@@ -44,7 +44,7 @@ def run(*command, folder) -> str:
 
 
 def compile_fuzz(folder: Path, *flags: str) -> None:
-    sources = [Path(__file__).with_name("fuzz.c"), "controller.c", "mpc.c", "qp.c"]
+    sources = [Path(__file__).with_name("fuzz.c"), "controller.c", "mpc.c", "qp.c", "qp_residual.c"]
     run(*c_compiler(), "-std=c99", "-I.", *flags, *sources, "-lm", "-o", "fuzz", folder=folder)
 
 
@@ -116,8 +116,49 @@ def test_two_controllers_of_other_names_and_sizes_share_a_program(tmp_path):
         "int main(void) { real y[2] = {0}, r[20] = {0}, w[1] = {0}, u[3]; arm_init(&a); wrist_init(&b);\n"
         "return arm_step(&a, y, r, u) + wrist_step(&b, y, r, w, u); }\n"
     )
-    run(*c_compiler(), *STRICT, "both.c", "arm.c", "wrist.c", "mpc.c", "qp.c", "-o", "both", folder=tmp_path / "one")
+    run(
+        *c_compiler(),
+        *STRICT,
+        "both.c",
+        "arm.c",
+        "wrist.c",
+        "mpc.c",
+        "qp.c",
+        "qp_residual.c",
+        "-o",
+        "both",
+        folder=tmp_path / "one",
+    )
     run("./both", folder=tmp_path / "one")
+
+
+@with_compiler
+def test_two_exports_of_different_number_types_link_into_one_program(tmp_path):
+    for name, real in (("arm", "double"), ("wrist", "float")):
+        export(record(LinearMPC(Modal()), samples=5), tmp_path / name, name=name, real=real, figures=False)
+        (tmp_path / name / "use.c").write_text(
+            f'#include "{name}.h"\nint use_{name}(void);\nint use_{name}(void) {{ static {name} c;'
+            f"real y[2] = {{0}}, r[20] = {{1}}, u[3]; {name}_init(&c); return {name}_step(&c, y, r, u); }}\n"
+        )
+        units = [f"{part}.c" for part in ("use", name, "mpc", "qp", "qp_residual")]
+        run(*c_compiler(), *STRICT, "-c", *units, folder=tmp_path / name)
+    (tmp_path / "main.c").write_text(
+        "int use_arm(void); int use_wrist(void);\nint main(void) { return use_arm() + use_wrist(); }\n"
+    )
+    objects = sorted(path.relative_to(tmp_path) for path in tmp_path.glob("*/*.o"))
+    run(*c_compiler(), "main.c", *objects, "-o", "both", folder=tmp_path)
+    run("./both", folder=tmp_path)
+
+
+@with_compiler
+def test_another_compiler_line_compiles_everything_again(folder, tmp_path):
+    here = shutil.copytree(folder, tmp_path / "here")
+    run("make", "-s", "test", folder=here)
+    before = (here / "mpc.o").stat().st_mtime_ns
+    run("make", "-s", "test", folder=here)
+    assert (here / "mpc.o").stat().st_mtime_ns == before
+    run("make", "-s", "test", "CFLAGS=-O1", folder=here)
+    assert (here / "mpc.o").stat().st_mtime_ns > before
 
 
 @with_compiler
@@ -132,10 +173,10 @@ def test_the_example_and_both_build_systems_work(folder, tmp_path):
 
 @with_compiler
 def test_nothing_is_allocated_printed_or_kept_outside_the_instance(folder):
-    for source in ("controller.c", "mpc.c", "qp.c"):
+    for source in ("controller.c", "mpc.c", "qp.c", "qp_residual.c"):
         run(*c_compiler(), "-std=c99", "-O2", "-fno-pic", "-c", source, "-o", "object.o", folder=folder)
         symbols = [line.split()[-2:] for line in run("nm", "object.o", folder=folder).splitlines()]
-        asked = {name for kind, name in symbols if kind == "U" and not name.startswith(("mpc_", "qp_", "_GLOBAL"))}
+        asked = {name for kind, name in symbols if kind == "U" and not name.startswith(("controller_", "_GLOBAL"))}
         assert asked <= {"memcpy", "memset", "memmove"}
         assert not [name for kind, name in symbols if kind in "bBdDC"]
 
@@ -258,4 +299,4 @@ def test_without_a_compiler_the_folder_is_written_and_the_reason_said(folder, tm
 
 
 def test_the_controllers_c_is_in_the_package():
-    assert set(controller_sources()) == {"real.h", "qp.h", "qp.c", "mpc.h", "mpc.c"}
+    assert set(controller_sources()) == {"real.h", "qp.h", "qp.c", "qp_residual.c", "mpc.h", "mpc.c"}

@@ -269,7 +269,7 @@ def test_another_run_takes_the_same_instructions_and_stack(emulated, core):
 def test_stack_is_that_of_the_deepest_chain_of_calls(emulated, tmp_path, core):
     folder, _, controller = emulated[core.name]
     command = ["arm-none-eabi-gcc", "-std=c99", "-O2", *core.flags, f"-I{folder}", "-fcallgraph-info=su", "-c"]
-    for source in ("mpc.c", "qp.c", "controller.c"):
+    for source in ("mpc.c", "qp.c", "qp_residual.c", "controller.c"):
         subprocess.run([*command, str(folder / source)], cwd=tmp_path, check=True)
     text = "".join(file.read_text() for file in tmp_path.glob("*.ci"))
     frames = {n: int(s) for n, s in re.findall(r'node: { title: "(\S+)" label: "\S+\\n(\d+) bytes \(static\)"', text)}

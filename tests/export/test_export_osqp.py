@@ -160,8 +160,8 @@ def write(program: Tracking, folder: Path, real: str) -> OsqpSources:
             f"static const real {name}[] = {{{', '.join(f'{value!r}{suffix}' for value in values.tolist())}}};"
         )
     (folder / "table.h").write_text("\n".join(lines))
-    for header in ("real.h", "qp.h"):
-        (folder / header).write_text((HEADERS / header).read_text())
+    for file in ("real.h", "qp.h", "qp_residual.c"):
+        (folder / file).write_text((HEADERS / file).read_text())
     (folder / "qp.c").write_text(osqp_adapter())
     (folder / "driver.c").write_text(DRIVER)
     return written
@@ -170,9 +170,9 @@ def write(program: Tracking, folder: Path, real: str) -> OsqpSources:
 def compiled(folder: Path, written: OsqpSources, options: Sequence[str], link: Sequence[str]) -> None:
     compiler = [*(c_compiler() or []), "-std=c99", "-O1", *options, *(f"-I{include}" for include in written.includes)]
     strict = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
-    subprocess.run([*compiler, *strict, "-c", "qp.c"], cwd=folder, check=True)
+    subprocess.run([*compiler, *strict, "-c", "qp.c", "qp_residual.c"], cwd=folder, check=True)
     subprocess.run([*compiler, "-w", "-c", "driver.c", *written.sources], cwd=folder, check=True)
-    objects = [f"{Path(source).stem}.o" for source in ("qp.c", "driver.c", *written.sources)]
+    objects = [f"{Path(source).stem}.o" for source in ("qp.c", "qp_residual.c", "driver.c", *written.sources)]
     subprocess.run([*(c_compiler() or []), *objects, *link], cwd=folder, check=True)
 
 

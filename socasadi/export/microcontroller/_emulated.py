@@ -1,4 +1,5 @@
 import struct
+from collections.abc import Iterable
 from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -13,6 +14,9 @@ from ._machine import Machine
 if TYPE_CHECKING:
     from ...mpc import LinearMPC
 
+
+_MOST_INSTRUCTIONS = 300_000_000
+"""After as many random samples have been enough: a few seconds of emulation. (A count, so that all runs are alike.)"""
 
 _COUNTS = ("status", "iterations", "steps", "clipped", "held", "refused", "worst_iterations")
 
@@ -48,7 +52,7 @@ class Footprint:
         Bytes of the controller, as :class:`Firmware` counts them.
     stack
         Bytes, the most that any step used.
-    instructions_median, instructions_worst
+    instructions_median, instructions_worst, iterations_worst
         Of the steps.
     image_flash, image_ram
         Bytes of the whole image in the emulator, without the stack.
@@ -59,13 +63,15 @@ class Footprint:
     stack: int
     instructions_median: int
     instructions_worst: int
+    iterations_worst: int
     image_flash: int
     image_ram: int
 
     def __str__(self) -> str:
         return (
             f"flash {self.flash / 1000:.1f} kB, RAM {self.ram / 1000:.1f} kB, stack {self.stack} bytes; "
-            f"instructions a step: median {self.instructions_median:,}, worst {self.instructions_worst:,}"
+            f"instructions a step: median {self.instructions_median:,}, worst {self.instructions_worst:,} "
+            f"({self.iterations_worst} iterations)"
         )
 
 
@@ -167,6 +173,16 @@ class Emulated:
         self.samples.append(Sample(self.info.status, self.info.iterations, instructions, stack))
         return numbers[2:]
 
+    def run_random(self, samples: Iterable[tuple[np.ndarray | None, tuple[np.ndarray, ...]]]) -> None:
+        """Meet samples as :meth:`ControllerRecord.random_samples` gives them, as long as they do not take too long."""
+        begin = len(self.samples)
+        for held, sample in samples:
+            if held is not None:
+                self.reset(held)
+            self.step(*sample)
+            if sum(done.instructions for done in self.samples[begin:]) > _MOST_INSTRUCTIONS:
+                return
+
     @property
     def footprint(self) -> Footprint:
         """What the controller asks of the microcontroller, from its image and all steps until now."""
@@ -179,6 +195,7 @@ class Emulated:
             stack=max(sample.stack for sample in self.samples),
             instructions_median=round(float(np.median(counts))),
             instructions_worst=max(counts),
+            iterations_worst=max(sample.iterations for sample in self.samples),
             image_flash=self.firmware.image_flash,
             image_ram=self.firmware.image_ram,
         )

@@ -19,7 +19,7 @@ LONGEST_CALL = 100_000_000
 """Instructions after which a call of the controller is broken off: half a second and more of a fast microcontroller."""
 
 _PREFIX = "arm-none-eabi-"
-_FLAGS = ("-std=c99", "-O2", "-ffunction-sections", "-fdata-sections")
+_FLAGS = ("-std=c99", "-ffp-contract=off", "-O2", "-ffunction-sections", "-fdata-sections")
 _STRICT = ("-ffreestanding", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 _PROGRAMS = ("example.c", "replay.c")
 _FIRMWARE = ("main", "startup", "semihosting")

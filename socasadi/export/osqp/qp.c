@@ -206,34 +206,3 @@ int qp_solve(qp *self, const real *centre) {
     osqp_cold_start(&osqp_solver);
     return status;
 }
-
-real qp_residual(qp *self, const real *centre) {
-    const qp_problem *problem = self->problem;
-    real worst = REAL(0.0);
-    int i, j;
-    for (i = 0; i < problem->rows; ++i) self->value[i] = centre[i];
-    for (j = 0; j < problem->rows; ++j) {
-        const real multiplier = self->multiplier[j], *entry = problem->gram + triangle(j);
-        if (multiplier == REAL(0.0)) continue;
-        for (i = 0; i < j; ++i) self->value[i] -= entry[i] * multiplier;
-        for (entry += j; i < problem->rows; ++i) {
-            self->value[i] -= *entry * multiplier;
-            entry += i + 1;
-        }
-    }
-    for (i = 0; i < problem->rows; ++i) {
-        const real multiplier = self->multiplier[i], value = self->value[i];
-        const real above = value - problem->upper[i], below = problem->lower[i] - value;
-        real off = larger(larger(above, below), REAL(0.0));
-        if (!real_finite(multiplier) || !real_finite(value)) return REAL_MAX;
-        if (multiplier != REAL(0.0)) {
-            const real over = real_abs(multiplier) - problem->price[i];
-            const real slack = is_soft(problem, i) ? problem->softness[i] * larger(over, REAL(0.0)) : REAL(0.0);
-            off = real_abs((multiplier > REAL(0.0) ? above : below) - slack);
-        }
-        off *= problem->unit[i];
-        if (!real_finite(off)) return REAL_MAX;
-        worst = larger(worst, off);
-    }
-    return worst;
-}

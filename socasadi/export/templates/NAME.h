@@ -14,6 +14,13 @@
 
 #include "mpc.h"
 
+{% if real == "float" %}#ifndef REAL_FLOAT
+#error "include {{ name }}.h, which is in float, in another file than a controller in double"
+#endif
+{% else %}#ifdef REAL_FLOAT
+#error "include {{ name }}.h, which is in double, in another file than a controller in float"
+#endif
+{% endif %}
 #ifdef __cplusplus
 extern "C" {
 #endif

@@ -101,17 +101,21 @@ static void centre(mpc *self, const real *reference) {
 static int decide(mpc *self, const real *reference, real *v) {
     const mpc_data *data = self->data;
     const int m = data->inputs;
-    int i;
+    int i, warm;
     centre(self, reference);
-    qp_solve(&self->solver, self->centre);
-    self->info.iterations = self->solver.iterations;
-    self->info.residual = qp_residual(&self->solver, self->centre);
-    if (self->info.residual <= data->tolerance) {
-        for (i = 0; i < m; ++i) v[i] = self->solver.value[i] * data->qp.unit[i];
-        return MPC_OPTIMAL;
-    }
-    /* A working set that led nowhere is not to be started from. */
-    qp_reset(&self->solver);
+    self->info.iterations = 0;
+    do {
+        warm = self->solver.active > 0;
+        qp_solve(&self->solver, self->centre);
+        self->info.iterations += self->solver.iterations;
+        self->info.residual = qp_residual(&self->solver, self->centre);
+        if (self->info.residual <= data->tolerance) {
+            for (i = 0; i < m; ++i) v[i] = self->solver.value[i] * data->qp.unit[i];
+            return MPC_OPTIMAL;
+        }
+        /* A working set that led nowhere is not to be started from: once more without one. */
+        qp_reset(&self->solver);
+    } while (warm);
     for (i = 0; i < m; ++i) v[i] = self->centre[i] * data->qp.unit[i];
     if (all_finite(v, m)) return MPC_CLIPPED;
     copy(v, self->v, m);
@@ -159,7 +163,6 @@ int mpc_step(mpc *self, const real *y, const real *reference, const real *w, rea
     /* The first rows of the program are the input, so that their bounds are those of v. */
     const real *unit = data->qp.unit, *lower = data->qp.lower, *upper = data->qp.upper;
     int i, status;
-    self->info.iterations = 0;
     observe(self, y);
     for (i = 0; i < data->disturbances; ++i)
         if (real_finite(w[i])) self->w[i] = w[i];

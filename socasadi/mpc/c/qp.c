@@ -76,6 +76,23 @@ static void update_value(qp *self, const real *centre) {
     }
 }
 
+/* The same for the rows of the working set alone. */
+static void update_active(qp *self, const real *centre) {
+    int k, l;
+    for (k = 0; k < self->active; ++k) {
+        const int i = self->row[k];
+        const real multiplier = self->multiplier[i];
+        real value = centre[i] - gram(self->problem, i, i) * multiplier;
+        for (l = 0; l < k; ++l) {
+            const int j = self->row[l];
+            const real entry = gram(self->problem, i, j);
+            value -= entry * self->multiplier[j];
+            self->value[j] -= entry * multiplier;
+        }
+        self->value[i] = value;
+    }
+}
+
 /* x <- L^-T x */
 static void solve_transposed(const qp *self, real *x) {
     int i, k;
@@ -119,19 +136,19 @@ static void take_out(qp *self, int k) {
     int i, j;
     for (i = k + 1; i < self->active; ++i) {
         const real *old = factor_row(self, i);
-        real *new = factor_row(self, i - 1);
+        real *moved = factor_row(self, i - 1);
         column[i - 1] = old[k];
-        for (j = 0; j < k; ++j) new[j] = old[j];
-        for (j = k; j < i - 1; ++j) new[j] = old[j + 1];
+        for (j = 0; j < k; ++j) moved[j] = old[j];
+        for (j = k; j < i - 1; ++j) moved[j] = old[j + 1];
         self->row[i - 1] = self->row[i];
         self->diagonal[i - 1] = self->diagonal[i];
     }
     self->active -= 1;
     for (j = k; j < self->active; ++j) {
-        const real head = column[j], old = self->diagonal[j], new = old + weight * head * head;
-        const real share = weight * head / new;
-        self->diagonal[j] = new;
-        weight *= old / new;
+        const real head = column[j], old = self->diagonal[j], updated = old + weight * head * head;
+        const real share = weight * head / updated;
+        self->diagonal[j] = updated;
+        weight *= old / updated;
         for (i = j + 1; i < self->active; ++i) {
             real *entry = factor_row(self, i) + j;
             column[i] -= head * *entry;
@@ -210,16 +227,16 @@ static void forget(qp *self) {
     }
 }
 
-/* Multipliers of the last working set for new centres. Those that fall out of their range change or leave, the
- * farthest first, until none does; when that takes too long the working set is given up. */
-static void warm_start(qp *self, const real *centre) {
+/* Multipliers of the working set for these centres. Those that fall out of their range change or leave, the farthest
+ * first, until none does; when that takes too long the working set is given up. */
+static void settle(qp *self, const real *centre) {
     const qp_problem *problem = self->problem;
-    int patience = 2 * self->active, k;
+    int patience = self->iterations + 2 * self->active, k;
     if (patience > problem->iterations) patience = problem->iterations;
     while (self->active > 0) {
         real farthest = REAL(0.0);
         int worst = -1, upper = 0;
-        update_value(self, centre);
+        update_active(self, centre);
         correct(self);
         for (k = 0; k < self->active; ++k) {
             const int j = self->row[k], state = self->state[j];
@@ -362,13 +379,13 @@ int qp_solve(qp *self, const real *centre) {
     }
     tolerance = TOLERANCE * scale;
     self->iterations = 0;
-    warm_start(self, centre);
+    settle(self, centre);
     for (;;) {
         int at = 0;
         const int j = most_violated(self, tolerance, &at);
         if (j < 0) {
             if (largest_excess(self) <= tolerance || corrections-- == 0) return QP_OPTIMAL;
-            correct(self);
+            settle(self, centre);
         } else {
             const real value = self->value[j];
             const real beyond = at > 0 ? value - self->problem->upper[j] : self->problem->lower[j] - value;
@@ -377,41 +394,7 @@ int qp_solve(qp *self, const real *centre) {
                 self->state[j] = NEGLECTED;
             else if (status != QP_OPTIMAL)
                 return status;
-        }
-        update_value(self, centre);
-    }
-}
-
-real qp_residual(qp *self, const real *centre) {
-    const qp_problem *problem = self->problem;
-    real worst = REAL(0.0);
-    int i, j;
-    for (i = 0; i < problem->rows; ++i) self->value[i] = centre[i];
-    for (j = 0; j < problem->rows; ++j) {
-        const real multiplier = self->multiplier[j], *entry = problem->gram + triangle(j);
-        if (multiplier == REAL(0.0)) continue;
-        for (i = 0; i < j; ++i) self->value[i] -= entry[i] * multiplier;
-        for (entry += j; i < problem->rows; ++i) {
-            self->value[i] -= *entry * multiplier;
-            entry += i + 1;
+            update_value(self, centre);
         }
     }
-    for (i = 0; i < problem->rows; ++i) {
-        const real multiplier = self->multiplier[i], value = self->value[i];
-        const real above = value - problem->upper[i], below = problem->lower[i] - value;
-        real off;
-        if (!real_finite(multiplier) || !real_finite(value)) return REAL_MAX;
-        if (multiplier == REAL(0.0)) {
-            off = above > below ? above : below;
-            if (off < REAL(0.0)) off = REAL(0.0);
-        } else {
-            const real over = real_abs(multiplier) - problem->price[i];
-            const real slack = problem->softness[i] > REAL(0.0) && over > REAL(0.0) ? problem->softness[i] * over : REAL(0.0);
-            off = real_abs((multiplier > REAL(0.0) ? above : below) - slack);
-        }
-        off *= problem->unit[i];
-        if (!real_finite(off)) return REAL_MAX;
-        if (off > worst) worst = off;
-    }
-    return worst;
 }
