@@ -1,6 +1,7 @@
 import functools
 import hashlib
 import json
+import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ import numpy as np
 from ..export import ControllerRecord, export
 from ._episode import Episode
 from ._journal import Flight, Journal, JournalError, Trial
+from ._settings import describe
 
 if TYPE_CHECKING:
     from ._study import Study
@@ -140,8 +142,10 @@ class Result:
                     f"    {entry.name} = {float(value)!r} {entry.unit.removesuffix('1')}".rstrip()
                     for entry, value in entries
                 ],
-                f"{mpc.input_term} input term, Q = {mpc.Q}, R = {mpc.R}, terminal cost {mpc.terminal}",
-                f"seed {self.study.seed}, search {self.study.search}, task {type(self.study.task).__name__}",
+                *_told("MPC", mpc),
+                *_told("task", self.study.task),
+                *_told("cost", self.study.cost),
+                f"search {self.study.search}, seed {self.study.seed}",
                 f"sha256 of the journal {digest}",
             ),
         )
@@ -153,3 +157,11 @@ class Result:
                 f"{self.folder} has no journal.sqlite: restore it from a copy, or start anew in another folder"
             )
         return Journal(path)
+
+
+def _told(title: str, part: object) -> list[str]:
+    """Every setting of a part of a study but its model, in lines of a header."""
+    settings = {name: value for name, value in describe(part).items() if name != "model"}
+    kind = settings.pop("type").rpartition(".")[2]
+    told = ", ".join(f"{name} = {json.dumps(value)}" for name, value in settings.items())
+    return textwrap.wrap(f"{title} {kind}: {told}", 110, subsequent_indent="    ", break_long_words=False)

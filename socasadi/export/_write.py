@@ -1,5 +1,6 @@
 import importlib.metadata
 import re
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +28,8 @@ _TEMPLATES = {
     "NAME.c": "{}.c",
     **{same: same for same in ("vectors.h", "replay.c", "example.c", "Makefile", "CMakeLists.txt")},
 }
-_MARK = "Made by socasadi"
+_MANIFEST = ".socasadi-export"
+"""Lists what an export wrote into its folder, which the next one there replaces."""
 
 
 _TAKEN = """
@@ -109,7 +111,8 @@ def export(
     design = record.mpc.design(record.system)
     given = tables(record.mpc, design, real)  # pyright: ignore[reportArgumentType] (checked above)
     library = _library(kind)
-    _claim(folder, [*library, *(file.format(name) for file in _TEMPLATES.values()), "README.md"])
+    generated = [file.format(name) for file in _TEMPLATES.values()]
+    _claim(folder, [*library, *generated, "README.md", *(["osqp"] if solver == "osqp" else [])])
     for file, text in library.items():
         (folder / file).write_text(text)
     osqp = None
@@ -127,7 +130,7 @@ def export(
     environment = _environment(real)
     for template, file in _TEMPLATES.items():
         (folder / file.format(name)).write_text(environment.get_template(template).render(facts))
-    # Last, because it tells what the others need; first without figures, so that a failure leaves an export behind.
+    # First without figures, so that a failure to measure leaves an export behind.
     readme = environment.get_template("README.md")
     (folder / "README.md").write_text(readme.render(facts, figures=[]))
     if figures:
@@ -156,16 +159,23 @@ def _library(kind: _Kind) -> dict[str, str]:
 
 
 def _claim(folder: Path, names: list[str]) -> None:
-    """Make the folder, or see that nothing in it is somebody else's."""
+    """Make the folder, or clear it of an earlier export, having seen that none of these names is somebody else's."""
     if folder.exists() and not folder.is_dir():
         raise ExportError(f"{folder} is a file; name a folder for the C files")
-    readme = folder / "README.md"
-    ours = readme.is_file() and _MARK in readme.read_text(errors="replace")
-    if not ours and (others := sorted(name for name in names if (folder / name).exists())):
+    manifest = folder / _MANIFEST
+    # Names in the folder itself, whatever may have been written into the list.
+    ours = {Path(name).name for name in manifest.read_text().splitlines()} if manifest.is_file() else set()
+    if others := sorted(name for name in names if (folder / name).exists() and name not in ours):
         raise ExportError(
             f"{folder} has files of the same names that are not an export's ({', '.join(others)}); choose another"
         )
+    for name in ours:
+        if (folder / name).is_dir():
+            shutil.rmtree(folder / name)
+        else:
+            (folder / name).unlink(missing_ok=True)
     folder.mkdir(parents=True, exist_ok=True)
+    manifest.write_text("\n".join(names) + "\n")
 
 
 def _facts(record: ControllerRecord, kind: _Kind, given: Tables) -> dict[str, Any]:
@@ -175,8 +185,7 @@ def _facts(record: ControllerRecord, kind: _Kind, given: Tables) -> dict[str, An
     share = _SHARE[kind.real]
     return {
         "title": "Model predictive controller tuned by socasadi",
-        "mark": _MARK,
-        "provenance": [*record.provenance, f"{_MARK} {importlib.metadata.version('socasadi')}"],
+        "provenance": [*record.provenance, f"made by {', '.join(_versions(kind))}"],
         "name": kind.name,
         "NAME": kind.name.upper(),
         "real": kind.real,
@@ -203,6 +212,11 @@ def _facts(record: ControllerRecord, kind: _Kind, given: Tables) -> dict[str, An
         "input": expected_inputs(record),
         "random_samples": RANDOM_SAMPLES,
     }
+
+
+def _versions(kind: _Kind) -> list[str]:
+    packages = ["socasadi", "casadi", "numpy", *(["osqp"] if kind.solver == "osqp" else [])]
+    return [f"{package} {importlib.metadata.version(package)}" for package in packages]
 
 
 def _environment(real: str) -> jinja2.Environment:

@@ -76,7 +76,7 @@ class Controller(ABC):
 
     def reset(self, u_prev: ArrayLike = 0.0) -> None:
         """Forget everything: the robot rests under the tensions ``u_prev``, N, a number or (m,)."""
-        held = np.asarray(u_prev, dtype=float)
+        held = _numbers("u_prev", u_prev)
         if held.shape not in ((), (self._m,)) or not np.isfinite(held).all():
             raise ValueError(f"u_prev is a finite number or ({self._m},) of them, not {u_prev}")
         self._rest(np.broadcast_to(held, (self._m,)).copy())
@@ -118,12 +118,12 @@ class Controller(ABC):
         ValueError
             A shape does not fit, or a value is not finite; the controller's state is then left as it was.
         """
-        measured = np.asarray(y, dtype=float)
+        measured = _numbers("y", y)
         if measured.shape != (self._p,):
             raise ValueError(f"y has shape {measured.shape}; this controller takes ({self._p},)")
         if not np.isfinite(measured).all():
             raise ValueError(f"y must be finite, not {measured}")
-        rows = np.asarray(reference, dtype=float)
+        rows = _numbers("reference", reference)
         if rows.shape != (self._p,) and (rows.ndim != 2 or rows.shape[1] != self._p or not len(rows)):
             raise ValueError(
                 f"reference has shape {rows.shape}; this controller takes ({self._p},) or a preview (k, {self._p})"
@@ -137,7 +137,16 @@ class Controller(ABC):
     def _measured_disturbance(self, disturbance: ArrayLike | None) -> np.ndarray:
         if disturbance is None and self._k:
             raise ValueError(f"this controller takes ({self._k},) measured disturbances beside y and the reference")
-        values = np.zeros(0) if disturbance is None else np.asarray(disturbance, dtype=float)
+        values = np.zeros(0) if disturbance is None else _numbers("disturbance", disturbance)
+        if values.size and not self._k:
+            raise ValueError(f"this controller takes no measured disturbances, and was told {disturbance}")
         if values.shape != (self._k,) or not np.isfinite(values).all():
             raise ValueError(f"disturbance is ({self._k},) finite numbers, not {disturbance}")
         return values
+
+
+def _numbers(name: str, values: ArrayLike) -> np.ndarray:
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} is numbers, not {values!r}") from None

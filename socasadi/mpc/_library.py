@@ -11,10 +11,12 @@ from ._tables import ProgramTables, Real, Tables
 # What C asks for its memory, for callers that cannot read its macros.
 _SIZES = """
 #include "mpc.h"
+int mpc_layout(void);
 int mpc_reals(const mpc_data *d);
 int mpc_ints(const mpc_data *d);
 int qp_reals(const qp_problem *p);
 int qp_ints(const qp_problem *p);
+int mpc_layout(void) { return (int)(sizeof(mpc) + sizeof(mpc_data)); }
 int mpc_reals(const mpc_data *d) {
     return MPC_REALS(d->order, d->inputs, d->outputs, d->disturbances, d->preview, d->qp.rows);
 }
@@ -94,6 +96,8 @@ class Library:
         for function in (self.c.mpc_init, self.c.mpc_reset, self.c.qp_init, self.c.qp_reset):
             function.restype = None
         self.c.qp_residual.restype = number
+        # A field that the headers have gained and the structures above have not would corrupt memory.
+        assert self.c.mpc_layout() == ctypes.sizeof(self.Mpc) + ctypes.sizeof(self.Data)
 
     def pointer(self, array: np.ndarray) -> Any:
         """Of an array of reals, or of ints."""

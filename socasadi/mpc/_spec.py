@@ -76,7 +76,8 @@ class LinearMPC:
     rate_bounds
         N/s; a pair of numbers or of m numbers each with 0 between them, infinite where there is no bound; or None.
     output_bounds
-        m; a pair of numbers or of p numbers each, infinite where there is no bound; or None.
+        m; a pair of numbers or of p numbers each, infinite where there is no bound; or None. A measurement beyond
+        10,000 times the largest of them is taken for a fault of the sensor, and corrects nothing.
     terminal
         ``"riccati"`` for V as above, None for no terminal cost.
     slack_weight

@@ -239,7 +239,7 @@ def test_flags_that_would_remove_the_checks_do_not_compile(folder):
 def test_the_header_says_where_the_controller_comes_from(folder):
     header = (folder / "controller_data.h").read_text()
     assert " * a test\n" in header
-    assert "Made by socasadi" in header
+    assert " * made by socasadi " in header
     assert "#define CONTROLLER_PREVIEW 10 " in (folder / "controller.h").read_text()
 
 
@@ -285,6 +285,16 @@ def test_no_file_of_somebody_elses_is_written_over(tmp_path):
     export(record(LinearMPC(Modal()), samples=2), tmp_path, figures=False)
     export(record(LinearMPC(Modal()), samples=3), tmp_path, figures=False)
     assert (tmp_path / "thesis.tex").read_text() == "all of it"
+
+
+def test_another_export_into_the_same_folder_leaves_nothing_of_the_first(tmp_path):
+    whole = record(LinearMPC(Modal()), samples=2)
+    export(whole, tmp_path / "a", name="arm", figures=False)
+    (tmp_path / "a" / "main.c").write_text("int main(void) { return 0; }")
+    export(whole, tmp_path / "a", name="wrist", figures=False)
+    export(whole, tmp_path / "b", name="wrist", figures=False)
+    there, fresh = ({file.name for file in (tmp_path / name).iterdir()} for name in "ab")
+    assert there == fresh | {"main.c"}
 
 
 def test_without_a_compiler_the_folder_is_written_and_the_reason_said(folder, tmp_path, monkeypatch):

