@@ -38,15 +38,16 @@ def control_law(mpc: "LinearMPC", design: Design, *, backend: str = CONIC[0], wi
     law: ca.MX = ca.DM(design.law) @ parameters
     gradient, free = ca.DM(design.gradient) @ parameters, ca.DM(design.row_free) @ parameters
     # Clipping drops a NaN, so these are looked at before it hides one.
-    lawful = finite(ca.vertcat(reference, law, gradient, free))
+    lawful = finite(ca.vertcat(reference, law))
     v, status, residual = ca.if_else(lawful, law, v_held), ca.if_else(lawful, 1, 2), ca.MX(ca.inf)
     if with_qp:
         # A solver may raise at what is not finite; nothing is asked of it then.
-        gradient, free = (ca.if_else(lawful, values, ca.DM.zeros(values.shape[0])) for values in (gradient, free))
+        solvable = ca.logic_and(lawful, finite(ca.vertcat(gradient, free)))
+        gradient, free = (ca.if_else(solvable, values, ca.DM.zeros(values.shape[0])) for values in (gradient, free))
         shape = Shape(design.hessian, design.rows, design.quadratic, design.price)
         bounds = gradient, ca.DM(design.row_lower) - free, ca.DM(design.row_upper) - free
         z, multipliers = qp_solver(backend, shape)(*bounds)
-        residual = ca.if_else(lawful, kkt_residual(shape)(*bounds, z, multipliers), ca.inf)
+        residual = ca.if_else(solvable, kkt_residual(shape)(*bounds, z, multipliers), ca.inf)
         believed = residual <= KKT_TOLERANCE
         v, status = ca.if_else(believed, z[:m], v), ca.if_else(believed, 0, status)
 

@@ -629,6 +629,21 @@ def test_an_answer_is_believed_up_to_the_residual_that_its_numbers_allow(real):
     assert 0.8 * limit < max(believed) <= limit < min(not_believed) < 1.25 * limit
 
 
+def test_what_is_applied_in_place_of_an_answer_is_what_the_observer_counts_with():
+    """With a cap of 0 the C is the clipped law, sample after sample."""
+    controller = TIGHT.controller_for(SYSTEM)
+    controller._data.qp.iterations = 0  # pyright: ignore[reportAttributeAccessIssue]
+    law, state = control_law(TIGHT, controller.design, with_qp=False), rest_state(TIGHT, controller.design, np.zeros(3))
+    rng = np.random.default_rng(19)
+    for _ in range(60):
+        _, y, reference = random_sample(rng, TIGHT)
+        u, after, *_ = law(y, reference.ravel(), (), state)
+        state = after.full().ravel()
+        assert np.allclose(controller.step(y, reference), u.full().ravel(), rtol=0, atol=1e-9)
+        assert np.allclose(np.concatenate(controller.estimate), state[:6], rtol=0, atol=1e-11)
+    assert controller.info.clipped > 30
+
+
 def test_after_a_reference_that_overflows_the_next_input_is_right():
     both = [replace(TIGHT, backend=name).controller_for(SYSTEM) for name in ("active-set", "daqp")]
     rng, spoilt, worst = np.random.default_rng(8), 0, 0

@@ -62,7 +62,7 @@ static void observe(mpc *self, const real *y) {
     add_product(self->predicted, data->B, self->v, n, data->inputs);
     add_product(self->predicted, data->E, self->w, n, data->disturbances);
     expect(self, self->predicted, self->innovation);
-    if (all_finite(self->predicted, n) && plausible(data, self->innovation)) {
+    if (plausible(data, self->innovation)) {
         copy(self->x, self->predicted, n);
     } else {
         rest(self);

@@ -44,7 +44,7 @@ real qp_residual(qp *self, const real *centre) {
     update_value(self, centre);
     for (i = 0; i < problem->rows; ++i) {
         const real off = violation(self, i) * problem->unit[i];
-        if (!real_finite(self->multiplier[i]) || !real_finite(self->value[i]) || !real_finite(off)) return REAL_MAX;
+        if (!real_finite(self->value[i]) || !real_finite(off)) return REAL_MAX;
         if (off > worst) worst = off;
     }
     return worst;
