@@ -1,5 +1,5 @@
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -52,6 +52,41 @@ class ControllerRecord:
                 raise ValueError(f"{name} of the recorded episode has shape {getattr(self, name).shape}, not {shape}")
         if not T:
             raise ValueError("the recorded episode is empty: there is nothing to check the controller on")
+
+    @classmethod
+    def simulated(cls, mpc: LinearMPC, system: StateSpace, *, samples: int = 200) -> "ControllerRecord":
+        """The controller of a model that came from no campaign, with an episode in which it meets that model itself.
+
+        The reference jumps every twenty samples to anywhere inside the output bounds, or as far as the inputs reach
+        without them; the sensor is as noisy as the Kalman filter assumes.
+
+        Raises
+        ------
+        DesignError
+            The model gives no controller.
+        """
+        mpc = replace(mpc, backend="active-set")
+        controller, random = mpc.controller_for(system), np.random.default_rng(0)
+        design, held = controller.design, np.mean(mpc.input_limits, axis=0)
+        controller.reset(held)
+        v = held / mpc.input_scale
+        x, w = design.rest @ v, np.zeros(mpc.measured_disturbances)
+        noise = np.linalg.cholesky(mpc.noise.measurement)
+        reach = np.abs(design.C @ design.rest + design.D) @ np.ones(mpc.inputs)
+        if mpc.output_limits is not None:
+            reach = np.minimum(reach, np.max(np.abs(mpc.output_limits), axis=0))
+        output, preview = [], []
+        for t in range(samples):
+            if t % 20 == 0:
+                wanted = np.tile(reach * random.uniform(-1, 1, mpc.outputs), (mpc.reference_rows, 1))
+            y = design.C @ x + design.D @ v + noise @ random.normal(size=mpc.outputs)
+            output.append(y)
+            preview.append(wanted)
+            v = controller.step(y, wanted, w if len(w) else None) / mpc.input_scale
+            x = design.A @ x + design.B @ v
+        told = (f"model of {len(system.A)} states, simulated on itself",)
+        nothing = np.zeros((samples, len(w)))
+        return cls(mpc, system, np.array(output), np.array(preview), held, nothing, provenance=told)
 
     def samples(self) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """What :meth:`Controller.step` was given at each sample: output, preview, measured disturbance."""

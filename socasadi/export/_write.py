@@ -1,6 +1,7 @@
 import importlib.metadata
 import re
 import shutil
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,12 +10,12 @@ from typing import Any
 import jinja2
 import numpy as np
 
-from ..mpc import Tables, check_real, controller_sources, tables
+from ..mpc import Design, Tables, check_real, controller_sources, tables
 from ._accept import FLOAT_SHARE, check_single_precision, expected_inputs
 from ._errors import ExportError
 from ._figures import RANDOM_SAMPLES, Figures, core_for, emulated_figures, host_figures
 from ._record import ControllerRecord
-from .osqp import osqp_adapter, write_osqp
+from .osqp import OsqpSources, osqp_adapter, write_osqp
 
 SOLVERS = ("active-set", "osqp")
 """QP solvers of an exported controller."""
@@ -112,15 +113,14 @@ def export(
     given = tables(record.mpc, design, real)  # pyright: ignore[reportArgumentType] (checked above)
     library = _library(kind)
     generated = [file.format(name) for file in _TEMPLATES.values()]
-    _claim(folder, [*library, *generated, "README.md", *(["osqp"] if solver == "osqp" else [])])
+    with tempfile.TemporaryDirectory() as scratch:
+        # Before anything of the folder is touched: the generator may be missing.
+        osqp = _generated_by_osqp(design, scratch, real) if solver == "osqp" else None
+        _claim(folder, [*library, *generated, "README.md", *(["osqp"] if osqp else [])])
+        if osqp:
+            shutil.copytree(Path(scratch) / "osqp", folder / "osqp")
     for file, text in library.items():
         (folder / file).write_text(text)
-    osqp = None
-    if solver == "osqp":
-        dual = design.dual
-        osqp = write_osqp(
-            design.hessian, design.rows / dual.unit[:, None], dual.softness, dual.price, folder, real=real
-        )
     facts = {
         **_facts(record, kind, given),
         "sources": [*(f for f in library if f.endswith(".c")), f"{name}.c", *(osqp.sources if osqp else ())],
@@ -136,6 +136,11 @@ def export(
     if figures:
         (folder / "README.md").write_text(readme.render(facts, figures=_figures(folder, kind, record, facts)))
     return folder
+
+
+def _generated_by_osqp(design: Design, folder: str, real: str) -> OsqpSources:
+    dual = design.dual
+    return write_osqp(design.hessian, design.rows / dual.unit[:, None], dual.softness, dual.price, folder, real=real)
 
 
 def _figures(folder: Path, kind: _Kind, record: ControllerRecord, facts: dict[str, Any]) -> list[Figures]:

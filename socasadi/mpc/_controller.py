@@ -75,7 +75,10 @@ class Controller(ABC):
     def _advance(self, y: np.ndarray, reference: np.ndarray, w: np.ndarray) -> np.ndarray: ...
 
     def reset(self, u_prev: ArrayLike = 0.0) -> None:
-        """Forget everything: the robot rests under the tensions ``u_prev``, N, a number or (m,)."""
+        """Forget everything: the robot rests under the tensions ``u_prev``, N, a number or (m,).
+
+        They may be out of the bounds, if the robot is; the next ones are inside, whatever the rate bounds.
+        """
         held = _numbers("u_prev", u_prev)
         if held.shape not in ((), (self._m,)) or not np.isfinite(held).all():
             raise ValueError(f"u_prev is a finite number or ({self._m},) of them, not {u_prev}")

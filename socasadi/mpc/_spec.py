@@ -51,7 +51,8 @@ class LinearMPC:
     Parameters
     ----------
     model
-        Family of prediction models; theta picks one.
+        Family of prediction models; theta picks one. Of a model given as it is, to :meth:`controller_for`, it says how
+        many outputs and inputs there are. A pole at 1 is refused: the controller needs to know where the model rests.
     sample_time
         s.
     horizon
@@ -233,7 +234,23 @@ class LinearMPC:
         return self.controller_for(self.model.state_space(theta, self.sample_time), real=real)
 
     def controller_for(self, system: StateSpace, *, real: Real = "double") -> Controller:
-        """The controller on a given discrete-time model, of any order, at this sample time."""
+        """The controller on a given discrete-time model of any order, sampled as this MPC is.
+
+        Parameters
+        ----------
+        system
+            A (n, n), B (n, m + k), C (p, n) and D (p, m + k): columns of B and D are the m tensions, N, and then the k
+            measured disturbances.
+        real
+            As in :meth:`controller`.
+
+        Raises
+        ------
+        ValueError
+            A shape does not fit.
+        DesignError
+            The model gives no controller.
+        """
         check_real(real)
         design = self.design(system)
         if self.backend == "active-set" and c_compiler() is not None:
