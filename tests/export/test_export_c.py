@@ -88,6 +88,18 @@ def test_so_do_those_that_solve_by_osqp(tmp_path, kind, real):
 
 
 @with_compiler
+@pytest.mark.parametrize("mpc", [LinearMPC(Modal()), BUSY, TOLD, KINDS["unbounded outputs"]])
+def test_a_controller_of_a_given_model_is_exported_with_an_episode_on_that_model(tmp_path, mpc):
+    system = mpc.model.state_space(THETA if mpc.model.inputs == 3 else FOUR, mpc.sample_time)
+    simulated = ControllerRecord.simulated(mpc, system, samples=60)
+    export(simulated, tmp_path, figures=False)
+    assert build_and_replay(tmp_path).startswith("60 samples, 0 clipped, 0 held")
+    # It tracks: after each jump of the reference the outputs come nearer to it than they were.
+    away = np.linalg.norm(simulated.output - simulated.preview[:, -1], axis=1)
+    assert away[21] > 3 * away[38]
+
+
+@with_compiler
 def test_a_replay_that_differs_is_an_error(folder, tmp_path):
     wrong = shutil.copytree(folder, tmp_path / "wrong")
     data = (wrong / "controller_data.h").read_text()

@@ -320,6 +320,6 @@ def test_without_a_compiler_the_step_is_interpreted_with_the_same_result(monkeyp
     x, tension = np.zeros(2 * PAPER.dof), [5.0, 0.0, 0.0]
     machine = PAPER.step(0.05)(x, tension, np.zeros(3)).full()
     monkeypatch.setenv("CC", "no-such-compiler")
-    monkeypatch.setattr("socasadi.codegen._compile._warn_interpreted", lambda: None)
+    monkeypatch.setattr("socasadi.codegen._compile.warn_interpreted", lambda: None)
     interpreted = copy.deepcopy(PAPER).step(0.05)(x, tension, np.zeros(3)).full()
     assert np.allclose(machine, interpreted, rtol=1e-10, atol=1e-12)
