@@ -25,7 +25,7 @@ ROOMS = {
 # What a room is made of beyond its table: libraries that serve one purpose in one room.
 LIBRARIES = {"codegen": {"platformdirs"}, "export": {"jinja2"}, "tune": {"threadpoolctl"}}
 # casadi is the language of everything symbolic, and a model's matrices are part of what is exported.
-GRANTED = {"plant": {"casadi"}, "export": {"casadi", "model"}}
+GRANTED = {"plant": {"casadi"}, "export": {"model"}}
 
 
 def modules(file: Path) -> set[tuple[str, ...]]:

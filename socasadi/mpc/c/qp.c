@@ -67,11 +67,12 @@ static void update_value(qp *self, const real *centre) {
     for (i = 0; i < problem->rows; ++i) self->value[i] = centre[i];
     for (k = 0; k < self->active; ++k) {
         const int w = self->row[k];
-        const real multiplier = self->multiplier[w], *entry = problem->gram + triangle(w);
-        for (i = 0; i < w; ++i) self->value[i] -= entry[i] * multiplier;
-        for (entry += w; i < problem->rows; ++i) {
-            self->value[i] -= *entry * multiplier;
-            entry += i + 1;
+        const real multiplier = self->multiplier[w];
+        int at = triangle(w);
+        for (i = 0; i < w; ++i) self->value[i] -= problem->gram[at + i] * multiplier;
+        for (at += w; i < problem->rows; ++i) {
+            self->value[i] -= problem->gram[at] * multiplier;
+            at += i + 1;
         }
     }
 }

@@ -4,17 +4,16 @@
 /* value = centre - gram multiplier */
 static void update_value(qp *self, const real *centre) {
     const qp_problem *problem = self->problem;
-    const real *row = problem->gram;
     int i, j;
     for (i = 0; i < problem->rows; ++i) self->value[i] = centre[i];
     for (j = 0; j < problem->rows; ++j) {
-        const real multiplier = self->multiplier[j], *entry = row;
-        row += j + 1;
+        const real multiplier = self->multiplier[j];
+        int at = j * (j + 1) / 2;
         if (multiplier == REAL(0.0)) continue;
-        for (i = 0; i < j; ++i) self->value[i] -= entry[i] * multiplier;
-        for (entry += j; i < problem->rows; ++i) {
-            self->value[i] -= *entry * multiplier;
-            entry += i + 1;
+        for (i = 0; i < j; ++i) self->value[i] -= problem->gram[at + i] * multiplier;
+        for (at += j; i < problem->rows; ++i) {
+            self->value[i] -= problem->gram[at] * multiplier;
+            at += i + 1;
         }
     }
 }
