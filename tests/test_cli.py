@@ -53,7 +53,7 @@ def test_run_ends_with_the_theta_the_figures_and_a_checked_controller(finished):
     names = {"convergence", "responses", "path", "inputs", "shapes"}
     assert {file.name for file in figures.iterdir()} == {f"{name}.{kind}" for name in names for kind in ("png", "pdf")}
     if c_compiler():
-        assert "20 samples, 0 clipped, 0 held" in run.stdout
+        assert "passed: 20 samples of the episode and 200 random ones, 0 clipped, 0 held" in run.stdout
 
 
 def test_show_plot_and_export_need_the_run_folder_alone(finished, tmp_path):

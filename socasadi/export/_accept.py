@@ -1,6 +1,7 @@
 """What the exported C is compared with, and whether single precision is good enough for a controller."""
 
 import dataclasses
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,11 +16,42 @@ FLOAT_SHARE = 1e-3
 _RANDOM_SAMPLES = 2000
 
 
-def expected_inputs(record: ControllerRecord) -> np.ndarray:
-    """What the controller answers to the recorded episode in Python, in double precision, (T, m)."""
+@dataclass(frozen=True, eq=False)
+class Vectors:
+    """What the exported C is replayed on: the recorded episode, and random samples behind it.
+
+    Attributes
+    ----------
+    start, held
+        Samples before which the controller starts anew, and the tensions (starts, m) under which the robot rests then.
+    output, reference, disturbance
+        (samples, ...) arguments of a step, the preview row after row.
+    input
+        (samples, m) what Python answers in double precision.
+    """
+
+    start: list[int]
+    held: np.ndarray
+    output: np.ndarray
+    reference: np.ndarray
+    disturbance: np.ndarray
+    input: np.ndarray
+
+
+def vectors(record: ControllerRecord, random: int) -> Vectors:
+    """The episode of ``record`` and as many random samples."""
     controller = dataclasses.replace(record.mpc, backend="active-set").controller_for(record.system)
-    controller.reset(record.held)
-    return np.array([controller.step(*sample) for sample in record.samples()])
+    episode = [(record.held if t == 0 else None, sample) for t, sample in enumerate(record.samples())]
+    start, held, given, answers = [], [], [], []
+    for t, (resting, sample) in enumerate([*episode, *record.random_samples(random)]):
+        if resting is not None:
+            start.append(t)
+            held.append(resting)
+            controller.reset(resting)
+        given.append(sample)
+        answers.append(controller.step(*sample))
+    output, preview, disturbance = (np.array(values) for values in zip(*given, strict=True))
+    return Vectors(start, np.array(held), output, preview.reshape(len(given), -1), disturbance, np.array(answers))
 
 
 def check_single_precision(record: ControllerRecord) -> float:

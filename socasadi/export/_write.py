@@ -11,7 +11,7 @@ import jinja2
 import numpy as np
 
 from ..mpc import Design, Tables, check_real, controller_sources, tables
-from ._accept import FLOAT_SHARE, check_single_precision, expected_inputs
+from ._accept import FLOAT_SHARE, check_single_precision, vectors
 from ._errors import ExportError
 from ._figures import RANDOM_SAMPLES, Figures, core_for, emulated_figures, host_figures
 from ._record import ControllerRecord
@@ -207,14 +207,10 @@ def _facts(record: ControllerRecord, kind: _Kind, given: Tables) -> dict[str, An
         "arrays": list(arrays),
         "program": list(given.program.arrays),
         "table_numbers": sum(values.size for values in (arrays | program).values()),
-        "samples": len(record.output),
+        "episode": len(record.output),
         "replay_tolerance": share,
         "scale": mpc.input_scale,
-        "held": record.held,
-        "output": record.output,
-        "reference": record.preview.reshape(len(record.output), -1),
-        "disturbance": record.disturbance,
-        "input": expected_inputs(record),
+        **vars(vectors(record, RANDOM_SAMPLES)),
         "random_samples": RANDOM_SAMPLES,
     }
 

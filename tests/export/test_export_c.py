@@ -56,7 +56,7 @@ def folder(tmp_path_factory):
 @with_compiler
 def test_the_built_controller_answers_as_python_does_to_the_last_bit(folder):
     said = build_and_replay(folder)
-    assert said.startswith("120 samples, 0 clipped, 0 held")
+    assert said.startswith("passed: 120 samples of the episode and 200 random ones, 0 clipped, 0 held")
     assert "largest difference from Python 0.0e+00 of the bound" in said
 
 
@@ -76,7 +76,9 @@ KINDS = {
 @pytest.mark.parametrize("kind", KINDS)
 def test_so_do_all_kinds_of_controllers_within_what_their_numbers_allow(tmp_path, kind, real):
     export(record(KINDS[kind], samples=40), tmp_path / "c", real=real, figures=False)
-    assert build_and_replay(tmp_path / "c").startswith("40 samples, 0 clipped, 0 held")
+    assert build_and_replay(tmp_path / "c").startswith(
+        "passed: 40 samples of the episode and 200 random ones, 0 clipped, 0 held"
+    )
 
 
 @with_compiler
@@ -84,7 +86,9 @@ def test_so_do_all_kinds_of_controllers_within_what_their_numbers_allow(tmp_path
 def test_so_do_those_that_solve_by_osqp(tmp_path, kind, real):
     pytest.importorskip("osqp", reason="the package osqp is not installed")
     export(record(KINDS[kind], samples=40), tmp_path / "c", real=real, solver="osqp", figures=False)
-    assert build_and_replay(tmp_path / "c").startswith("40 samples, 0 clipped, 0 held")
+    assert build_and_replay(tmp_path / "c").startswith(
+        "passed: 40 samples of the episode and 200 random ones, 0 clipped, 0 held"
+    )
 
 
 @with_compiler
@@ -93,7 +97,9 @@ def test_a_controller_of_a_given_model_is_exported_with_an_episode_on_that_model
     system = mpc.model.state_space(THETA if mpc.model.inputs == 3 else FOUR, mpc.sample_time)
     simulated = ControllerRecord.simulated(mpc, system, samples=60)
     export(simulated, tmp_path, figures=False)
-    assert build_and_replay(tmp_path).startswith("60 samples, 0 clipped, 0 held")
+    assert build_and_replay(tmp_path).startswith(
+        "passed: 60 samples of the episode and 200 random ones, 0 clipped, 0 held"
+    )
     # It tracks: after each jump of the reference the outputs come nearer to it than they were.
     away = np.linalg.norm(simulated.output - simulated.preview[:, -1], axis=1)
     assert away[21] > 3 * away[38]

@@ -928,7 +928,9 @@ def test_bounds_that_are_infinite_are_exported_as_numbers(tmp_path, real):
     one_sided = LinearMPC(Modal(), rate_bounds=bounds, output_bounds=((-np.inf, -0.1), (0.1, np.inf)))
     rng = np.random.default_rng(17)
     export(recorded(one_sided, 0.03 * rng.normal(size=(20, 2))), tmp_path, real=real, figures=False)
-    assert build_and_replay(tmp_path).startswith("20 samples, 0 clipped, 0 held")
+    assert build_and_replay(tmp_path).startswith(
+        "passed: 20 samples of the episode and 200 random ones, 0 clipped, 0 held"
+    )
 
 
 def test_a_row_without_bounds_is_free_however_far_it_goes():

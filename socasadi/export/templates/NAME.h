@@ -1,7 +1,7 @@
 /* {{ title }}: one call a sample.
  *
  *   static {{ name }} c;
- *   {{ name }}_init(&c);                        once
+ *   {{ name }}_init(&c);                        once, before anything else; a copy of c needs its own
  *   {{ name }}_reset(&c, u_before);             whenever the robot rests under known inputs
  *   status = {{ name }}_step(&c, y, r{{ ", w" if disturbances else "" }}, u);   every {{ NAME }}_SAMPLE_TIME seconds
  *

@@ -34,7 +34,9 @@ typedef struct {
 } mpc_data;
 
 enum mpc_status {
-    MPC_OPTIMAL = 0, /* u is the QP's answer, checked against its optimality conditions */
+    MPC_OPTIMAL = 0, /* u is the QP's answer, checked against its optimality conditions. (Even if y was refused: then it
+                      * is the answer for the predicted state, and info.refused has counted one more. With a sensor
+                      * dead for longer than the model can be trusted, stop.) */
     MPC_CLIPPED = 1, /* the QP gave no answer that passed: the unconstrained law, clipped to the bounds */
     MPC_HELD = 2     /* that was not finite, or the reference was not: the input before is held */
 };
@@ -42,7 +44,7 @@ enum mpc_status {
 typedef struct {
     int status;              /* of the last step */
     int iterations;          /* of the QP in the last step */
-    real residual;           /* KKT residual of the QP's last answer */
+    real residual;           /* KKT residual of the QP's last answer; REAL_MAX: it was no number */
     unsigned long steps;     /* since the reset, as all that follow */
     unsigned long clipped;   /* steps that ended MPC_CLIPPED */
     unsigned long held;      /* steps that ended MPC_HELD */
@@ -68,10 +70,12 @@ typedef struct {
     qp solver;
 } mpc;
 
-/* Lays the controller out in reals[MPC_REALS(...)] and ints[MPC_INTS(...)]; the robot is taken to rest without input. */
+/* Lays the controller out in reals[MPC_REALS(...)] and ints[MPC_INTS(...)]; the robot is taken to rest without input.
+ * It comes before anything else, and again for a copy: self points into that memory. */
 void mpc_init(mpc *self, const mpc_data *data, real *reals, int *ints);
 
-/* The robot rests under the inputs u_before (inputs), undisturbed as far as is known. What is not finite counts as 0. */
+/* The robot rests under the inputs u_before (inputs), undisturbed as far as is known. What is not finite counts as 0;
+ * what is out of the bounds is believed, and the first u is inside all the same. */
 void mpc_reset(mpc *self, const real *u_before);
 
 /* One sample; returns an enum mpc_status.
