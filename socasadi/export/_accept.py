@@ -28,6 +28,8 @@ class Vectors:
         (samples, ...) arguments of a step, the preview row after row.
     input
         (samples, m) what Python answers in double precision.
+    fallbacks
+        Samples in which that is not the QP's answer.
     """
 
     start: list[int]
@@ -36,13 +38,14 @@ class Vectors:
     reference: np.ndarray
     disturbance: np.ndarray
     input: np.ndarray
+    fallbacks: int
 
 
 def vectors(record: ControllerRecord, random: int) -> Vectors:
     """The episode of ``record`` and as many random samples."""
     controller = dataclasses.replace(record.mpc, backend="active-set").controller_for(record.system)
     episode = [(record.held if t == 0 else None, sample) for t, sample in enumerate(record.samples())]
-    start, held, given, answers = [], [], [], []
+    start, held, given, answers, fallbacks = [], [], [], [], 0
     for t, (resting, sample) in enumerate([*episode, *record.random_samples(random)]):
         if resting is not None:
             start.append(t)
@@ -50,8 +53,11 @@ def vectors(record: ControllerRecord, random: int) -> Vectors:
             controller.reset(resting)
         given.append(sample)
         answers.append(controller.step(*sample))
+        fallbacks += controller.info.status != 0
     output, preview, disturbance = (np.array(values) for values in zip(*given, strict=True))
-    return Vectors(start, np.array(held), output, preview.reshape(len(given), -1), disturbance, np.array(answers))
+    return Vectors(
+        start, np.array(held), output, preview.reshape(len(given), -1), disturbance, np.array(answers), fallbacks
+    )
 
 
 def check_single_precision(record: ControllerRecord) -> float:

@@ -2,6 +2,7 @@ import importlib.metadata
 import re
 import shutil
 import tempfile
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +30,9 @@ _TEMPLATES = {
     "NAME.c": "{}.c",
     **{same: same for same in ("vectors.h", "replay.c", "example.c", "Makefile", "CMakeLists.txt")},
 }
+_MANY = 0.02
+"""Share of samples that fall back, beyond which an export warns."""
+
 _MANIFEST = ".socasadi-export"
 """Lists what an export wrote into its folder, which the next one there replaces."""
 
@@ -184,7 +188,14 @@ def _claim(folder: Path, names: list[str]) -> None:
 
 
 def _facts(record: ControllerRecord, kind: _Kind, given: Tables) -> dict[str, Any]:
-    mpc = record.mpc
+    mpc, replayed = record.mpc, vectors(record, RANDOM_SAMPLES)
+    if replayed.fallbacks > _MANY * len(replayed.input):
+        warnings.warn(
+            f"in {replayed.fallbacks} of {len(replayed.input)} samples this controller falls back from its QP's answer, "
+            "which does not pass the check: its weights lie too many decades apart",
+            RuntimeWarning,
+            stacklevel=4,
+        )
     program = {f"qp_{array}": values for array, values in given.program.arrays.items()}
     arrays = {array: values for array, values in given.arrays.items() if values.size}
     share = _SHARE[kind.real]
@@ -210,7 +221,7 @@ def _facts(record: ControllerRecord, kind: _Kind, given: Tables) -> dict[str, An
         "episode": len(record.output),
         "replay_tolerance": share,
         "scale": mpc.input_scale,
-        **vars(vectors(record, RANDOM_SAMPLES)),
+        **vars(replayed),
         "random_samples": RANDOM_SAMPLES,
     }
 

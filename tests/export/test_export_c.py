@@ -169,6 +169,37 @@ def test_two_exports_of_different_number_types_link_into_one_program(tmp_path):
 
 
 @with_compiler
+def test_two_exports_that_solve_by_osqp_do_not_link_into_one_program(tmp_path):
+    pytest.importorskip("osqp", reason="the package osqp is not installed")
+    for name in ("arm", "wrist"):
+        export(record(LinearMPC(Modal()), samples=2), tmp_path / name, name=name, solver="osqp", figures=False)
+        run("make", "-s", folder=tmp_path / name)
+    (tmp_path / "main.c").write_text(
+        "void arm_init(void *); void wrist_init(void *); int arm_step(); int wrist_step();\n"
+        "int main(void) { arm_init(0); wrist_init(0); return arm_step() + wrist_step(); }\n"
+    )
+    command = [*(c_compiler() or []), "main.c", "arm/libarm.a", "wrist/libwrist.a", "-lm", "-o", "both"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode != 0
+    assert "only_one_osqp_in_a_program" in done.stderr
+
+
+@with_compiler
+def test_data_of_another_size_do_not_compile(folder, tmp_path):
+    here = shutil.copytree(folder, tmp_path / "here")
+    export(record(LinearMPC(Modal(), horizon=12), samples=2), tmp_path / "longer", figures=False)
+    shutil.copy(tmp_path / "longer" / "controller_data.h", here)
+    command = [*(c_compiler() or []), "-std=c99", "-c", "controller.c", "-o", "object.o"]
+    assert subprocess.run(command, cwd=here, capture_output=True).returncode != 0
+
+
+def test_a_controller_whose_qp_is_seldom_solved_is_exported_with_a_warning(tmp_path):
+    hopeless = LinearMPC(Modal(), Q=1e6, R=1e-9)
+    with pytest.warns(RuntimeWarning, match="samples this controller falls back from its QP's answer"):
+        export(record(hopeless), tmp_path, figures=False)
+
+
+@with_compiler
 def test_another_compiler_line_compiles_everything_again(folder, tmp_path):
     here = shutil.copytree(folder, tmp_path / "here")
     run("make", "-s", "test", folder=here)

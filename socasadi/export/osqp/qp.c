@@ -49,6 +49,10 @@ enum { INACTIVE = 0, TIGHT = 1, SLACK = 2 };
 #define CALLS 100
 #define REVISIONS 3
 
+/* OSQP's names are the same in every export, its code is not: a program with two of them is to fail when it is linked. */
+extern const char only_one_osqp_in_a_program;
+const char only_one_osqp_in_a_program = 0;
+
 static real from[OSQP_CONSTRAINTS], to[OSQP_CONSTRAINTS];
 
 static int is_soft(const qp_problem *problem, int i) { return problem->softness[i] > REAL(0.0); }

@@ -2,6 +2,10 @@
 
 #include "{{ name }}_data.h"
 
+/* Data of other sizes do not compile. */
+typedef char map_has_its_size[sizeof {{ name }}_map == sizeof(real) * {{ NAME }}_ROWS * MPC_PARAMETERS({{ NAME }}_ORDER, {{ NAME }}_INPUTS, {{ NAME }}_OUTPUTS, {{ NAME }}_DISTURBANCES, {{ NAME }}_PREVIEW) ? 1 : -1];
+typedef char gram_has_its_size[2 * sizeof {{ name }}_qp_gram == sizeof(real) * {{ NAME }}_ROWS * ({{ NAME }}_ROWS + 1) ? 1 : -1];
+
 static const mpc_data data = {
     .order = {{ NAME }}_ORDER,
     .inputs = {{ NAME }}_INPUTS,

@@ -7,8 +7,10 @@
  *
  * Units are those of the campaign: y and r in metres and u in newtons, unless the study says otherwise. What is done
  * with each argument, and what is promised of u, is said in mpc.h.
- * Everything is in the struct: several controllers may run side by side, and none allocates.
- */
+{% if osqp %} * OSQP keeps its workspace in static memory: one controller, one instance, never two steps at a time. None allocates.
+{% else %} * Everything is in the struct: several controllers may run side by side, and none allocates. One struct belongs to one
+ * caller: never step it from a thread and an interrupt at once.
+{% endif %} */
 #ifndef {{ NAME }}_H
 #define {{ NAME }}_H
 
