@@ -191,7 +191,7 @@ def _facts(record: ControllerRecord, kind: _Kind, given: Tables) -> dict[str, An
     mpc, replayed = record.mpc, vectors(record, RANDOM_SAMPLES)
     if replayed.fallbacks > _MANY * len(replayed.input):
         warnings.warn(
-            f"in {replayed.fallbacks} of {len(replayed.input)} samples this controller falls back from its QP's answer: "
+            f"in {replayed.fallbacks} of {len(replayed.input)} samples the controller falls back from its QP's answer: "
             "it does not pass the check, for the weights lie too many decades apart",
             RuntimeWarning,
             stacklevel=4,

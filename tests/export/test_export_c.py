@@ -195,7 +195,7 @@ def test_data_of_another_size_do_not_compile(folder, tmp_path):
 
 def test_a_controller_whose_qp_is_seldom_solved_is_exported_with_a_warning(tmp_path):
     hopeless = LinearMPC(Modal(), Q=1e6, R=1e-9)
-    with pytest.warns(RuntimeWarning, match="samples this controller falls back from its QP's answer"):
+    with pytest.warns(RuntimeWarning, match="samples the controller falls back from its QP's answer"):
         export(record(hopeless), tmp_path, figures=False)
 
 
