@@ -31,7 +31,13 @@ static real drawn_back(const qp_problem *problem, int i, real t, real beyond) {
  * S. Boyd, "Proximal algorithms", Foundations and Trends in Optimization 1, 2014, section 2.3.) */
 static real violation(const qp *self, int i) {
     const qp_problem *problem = self->problem;
-    const real t = problem->gram[i * (i + 1) / 2 + i], push = t * self->multiplier[i], target = self->value[i] + push;
+    const real multiplier = self->multiplier[i], value = self->value[i];
+    real t, push, target;
+    /* As most rows are, in short. */
+    if (multiplier == REAL(0.0) && value >= problem->lower[i] && value <= problem->upper[i]) return REAL(0.0);
+    t = problem->gram[i * (i + 1) / 2 + i];
+    push = t * multiplier;
+    target = value + push;
     return real_abs(push - drawn_back(problem, i, t, target - problem->upper[i]) +
                     drawn_back(problem, i, t, problem->lower[i] - target));
 }
