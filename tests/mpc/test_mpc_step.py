@@ -15,14 +15,8 @@ from socasadi.mpc import (
 )
 
 pytestmark = pytest.mark.skipif(c_compiler() is None, reason="no C compiler")
-
-
 THETA = np.array([4.6, 0.08, 6e-3, -3e-3, -3e-3, 5.2, 0.15, 0.5e-3, 5e-3, -5e-3])
-
-
 SYSTEM = Modal().state_space(THETA, 0.05)
-
-
 TIGHT = LinearMPC(Modal(), input_bounds=(-4, 4), output_bounds=(-0.03, 0.03))
 
 
