@@ -102,8 +102,9 @@ class LinearMPC:
     backend
         QP solver: ``"active-set"``, the project's own, compiled; ``"daqp"``, ``"qpoases"`` or ``"osqp"``.
     iteration_limit
-        Changes of the working set after which ``"active-set"`` gives a sample up to the clipped unconstrained law: it
-        bounds the time of a step. None: 50, and two more a constraint.
+        Changes of the working set after which ``"active-set"`` gives up; it then tries once more from nothing, unless
+        it has, before the clipped unconstrained law is applied. This bounds the time of a step. None: 50, and two more
+        a constraint.
 
     Raises
     ------
