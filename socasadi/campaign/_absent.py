@@ -5,7 +5,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._settings import ForeignTypeError
+from .store import ForeignTypeError
 
 
 @dataclass

@@ -9,10 +9,9 @@ import numpy as np
 from ..model import identify, prediction_error
 from ..mpc import DesignError
 from ._campaign import fly_once
-from ._episode import Episode
-from ._journal import Flight, Journal
-from ._probe import probe
 from ._result import Result, journal_path
+from .experiment import Episode, probe
+from .store import Flight, Journal
 
 # Streams of random numbers beside the trials' own, which is 0.
 _VERIFICATION, _PROBE = 1, 2

@@ -12,12 +12,10 @@ import numpy as np
 
 from ..mpc import DesignError
 from ..tune import Search
-from ._episode import Episode, Pilot, fly
-from ._interrupt import interruptible
-from ._journal import Journal, Trial
-from ._progress import Clock, Progress
 from ._result import Result, RunError, best_trial, journal_path, read_settings
-from ._settings import differences
+from .execution import Clock, Progress
+from .experiment import Episode, Pilot, fly, interruptible
+from .store import Journal, Trial, differences
 
 if TYPE_CHECKING:
     from ._study import Study

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..export import RANDOM_SAMPLES, Emulated, EmulatorError, Footprint, build, core_for, export, toolchain
 from ..mpc import Real, check_real
-from ._episode import Episode, fly
 from ._result import Result, RunError
+from .experiment import Episode, fly
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..export import ControllerRecord, export
-from ._episode import Episode
-from ._journal import Flight, Journal, JournalError, Trial
-from ._settings import describe
+from .experiment import Episode
+from .store import Flight, Journal, JournalError, Trial, describe
 
 if TYPE_CHECKING:
     from ._study import Study

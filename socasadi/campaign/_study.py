@@ -11,11 +11,10 @@ from ..plant import Plant
 from ..tune import Optimizer, Search, SobolSearch, Space
 from ._absent import AbsentPlant
 from ._campaign import run_campaign
-from ._cost import Cost
-from ._progress import Progress, print_progress
 from ._result import Result
-from ._settings import ForeignTypeError, describe, rebuild
-from ._task import Task
+from .execution import Progress, print_progress
+from .experiment import Cost, Task
+from .store import ForeignTypeError, describe, rebuild
 
 _MEMBERS = ("sample_time", "inputs", "outputs", "tension", "reset", "step")
 

@@ -7,9 +7,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import Record
-from ..mpc import ControllerInfo, LinearMPC
-from ..plant import Plant
+from ...model import Record
+from ...mpc import ControllerInfo, LinearMPC
+from ...plant import Plant
 from ._interrupt import check_interrupt
 from ._task import Task
 

@@ -1,7 +1,7 @@
 import time
 from dataclasses import dataclass
 
-from ._journal import Trial
+from ..store import Trial
 
 
 @dataclass(frozen=True)

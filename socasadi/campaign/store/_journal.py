@@ -12,8 +12,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from ._cost import Score
-from ._episode import Episode
+from ..experiment import Episode, Score
 
 SCHEMA = 1
 

@@ -1,7 +1,7 @@
 import numpy as np
 
-from ..model import Record
-from ..plant import Plant
+from ...model import Record
+from ...plant import Plant
 from ._episode import measured
 
 

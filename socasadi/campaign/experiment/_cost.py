@@ -2,7 +2,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mpc import InputTerm, Weight, check_input_term, weight_matrix
+from ...mpc import InputTerm, Weight, check_input_term, weight_matrix
 from ._episode import Episode
 
 
