@@ -10,27 +10,19 @@ Knows nothing of robots. GPy gives the marginal likelihood; prediction and acqui
     search.best
 """
 
-from ._acquisition import expected_improvement, log_expected_improvement
-from ._fit import FitSettings, fit
 from ._optimizer import Optimizer
-from ._posterior import Hyperparameters, Posterior
-from ._search import Search, Timings, Trial
+from ._search import Estimate, Search, Timings, Trial
 from ._sobol import SobolSearch
 from ._space import Parameter, ParameterLike, Space
 
 __all__ = [
-    "FitSettings",
-    "Hyperparameters",
+    "Estimate",
     "Optimizer",
     "Parameter",
     "ParameterLike",
-    "Posterior",
     "Search",
     "SobolSearch",
     "Space",
     "Timings",
     "Trial",
-    "expected_improvement",
-    "fit",
-    "log_expected_improvement",
 ]

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
-from ._acquisition import acquisition_named
-from ._fit import FitSettings, fit, import_gpy
-from ._maximise import maximise
-from ._posterior import Posterior
-from ._search import History, Timings, Trial, check_seed
+from ._belief import Belief, Believer, Start, last_full_fit
+from ._search import Estimate, History, Timings, Trial, check_seed
 from ._sobol import SobolPoints
 from ._space import Space
-from ._targets import Targets, targets
-from ._transform import transform_named
+from .acquisition import Constraint, Merit, acquisition_named, maximise
+from .surrogate import FitSettings, Posterior, import_gpy, transform_named
 
 _INCUMBENTS = 5
+_FANTASIES = 8
+_HIDDEN_WORLDS = 16
 
 
 class Optimizer:
@@ -29,12 +28,11 @@ class Optimizer:
     First the points of `initial`, then scrambled Sobol points until `seed_points` trials are told, then the
     maximiser of the acquisition over a Gaussian process of the transformed, standardised costs.
 
-    **What is asked is a pure function of the settings, the seed and the ordered list of told trials.**
-    Nothing else is remembered: random numbers derive from (seed, number of trials told), and hyperparameters
-    are fitted anew at every ask from starts that do not depend on earlier fits. A search that is rebuilt by
-    telling it the stored trials again (which costs next to nothing) goes on with the very point, bit for bit,
-    that there would have been; two asks without a tell between give the same point. (On one machine: another
-    linear algebra library may change last bits.)
+    **What is asked is a pure function of the settings, the seed, the ordered list of told trials, and the ordered list
+    of pending thetas.** Nothing else is remembered: random numbers derive from (seed, numbers of trials told and
+    pending), and hyperparameters from the told trials. A search that is rebuilt by telling it the stored trials again
+    (which costs next to nothing) goes on with the very point, bit for bit, that there would have been; two asks
+    without a tell between give the same point. (On one machine: another linear algebra library may change last bits.)
 
     Parameters
     ----------
@@ -47,15 +45,32 @@ class Optimizer:
         Start points inside the bounds that are asked first, all of them, in order.
     kernel : {"matern52", "rbf"}
         With one lengthscale a dimension.
-    acquisition : {"log_ei", "ei"}
-    transform : {"log-half-rank", "log", "none"}
-        What is modelled: log J with the worse half replaced by its ranks, log J (both need J > 0), or J.
+    acquisition : {"log_ei", "ei", "noisy_ei", "ucb"}
+        Expected improvement by its logarithm or plain; averaged over what noise may have hidden at the told points;
+        the confidence bound.
+    transform : {"power", "power-half-rank", "half-rank", "log", "log-half-rank", "box-cox", "yeo-johnson", "none"}
+        What is modelled: J, its logarithm, or a power of it: "power" takes the Yeo-Johnson power, from the linear one
+        to the reciprocal, under which the process finds the costs most probable; "box-cox" and "yeo-johnson" the one
+        that makes them most normal. "half-rank" keeps of the worse half little more than the order. Logarithm and
+        "box-cox" need J > 0.
     mean : {"constant", "zero"}
         Learned constant, or zero, of the standardised targets.
     priors : bool
         Lengthscale priors scaled with sqrt(d) (Hvarfner et al. 2024) on top of the marginal likelihood.
     noise : "fitted" or float
-        Fitted, or the fixed variance of the observation noise on the scale of the standardised targets.
+        Fitted, or the fixed variance of the observation noise on the scale of the standardised targets. Deviations
+        that are told with the trials come on top.
+    warp : bool
+        Fit a monotone warping of each coordinate, too.
+    limits : mapping of str to float, optional
+        Quantities measured in each experiment that have to stay at or below a limit. Each gets a Gaussian process, and
+        the acquisition is weighed with the probability that all are kept.
+    admissible : callable, optional
+        Whether theta (d,) may be asked at all, known before any experiment; a pure function, and cheap: a few dozen
+        calls an ask, at worst some thousand.
+    active_set : int, optional
+        Beyond so many trials the process is fitted to this many of them: the better half, and of the rest some at
+        random.
 
     Raises
     ------
@@ -64,9 +79,10 @@ class Optimizer:
 
     Notes
     -----
-    A failed trial stands in the model as the worst cost seen plus a tenth of the range seen, on the
-    transformed scale, so that it steers the search away, as in Vizier (Song et al. 2024, arXiv 2408.11527);
-    it is never the best. While there are only failures the Sobol sequence goes on.
+    Failed trials teach a Gaussian process of their own where experiments fail, and the acquisition is weighed with the
+    probability of success; they never are the best. While there are only failures the Sobol sequence goes on.
+    Trials that were cut count as lower bounds. The best told point is asked again when the model, noise included,
+    expects more of that than of any new point; a cost that came out the same to ten digits is taken for free of noise.
     """
 
     def __init__(
@@ -78,24 +94,38 @@ class Optimizer:
         initial: Sequence[ArrayLike] = (),
         kernel: str = "matern52",
         acquisition: str = "log_ei",
-        transform: str = "log-half-rank",
+        transform: str = "power",
         mean: str = "constant",
         priors: bool = True,
         noise: float | Literal["fitted"] = "fitted",
+        warp: bool = False,
+        limits: Mapping[str, float] | None = None,
+        admissible: Callable[[NDArray], bool] | None = None,
+        active_set: int = 300,
     ) -> None:
-        if isinstance(seed_points, bool) or not isinstance(seed_points, int | np.integer) or seed_points < 1:
-            raise ValueError(f"seed_points is {seed_points!r}: it must be an integer, 1 or more")
         self._seed = check_seed(seed)
-        self._seed_points = int(seed_points)
+        self._seed_points = _count("seed_points", seed_points)
         self._initial = [space.check(theta) for theta in initial]
         self._acquisition = acquisition_named(acquisition)
         self._transform = transform_named(transform)
-        self._fit_settings = FitSettings(kernel, mean, priors, None if noise == "fitted" else noise)
-        self._history = History(space)
-        self._sobol = SobolPoints(space.dimension, self._seed)
+        self._history = History(space, limits)
+        self._believer = Believer(
+            space,
+            self._transform,
+            FitSettings(kernel, mean, priors, None if noise == "fitted" else noise, warp),
+            self._history.limits,
+            _count("active_set", active_set),
+            self._seed,
+        )
+        self._admissible = admissible
+        for theta in self._initial:
+            if not self._may_ask(theta):
+                raise ValueError(f"the start point {theta.tolist()} does not keep the conditions: leave it out")
+        self._sobol = SobolPoints(space, self._seed, admissible)
         self._timings = Timings()
-        self._fitted: tuple[int, Posterior, Targets] | None = None
-        self._asked: tuple[int, NDArray] | None = None
+        self._belief: Belief | None = None
+        self._full: tuple[int, Start] | None = None
+        self._asked: tuple[tuple[int, bytes], NDArray] | None = None
 
     @classmethod
     def paper(cls, space: Space, seed: int = 0, *, seed_points: int = 10) -> Optimizer:
@@ -129,8 +159,22 @@ class Optimizer:
 
     @property
     def best(self) -> Trial | None:
-        """The best observed trial that did not fail, or None."""
+        """The best observed trial that kept all limits, or None."""
         return self._history.best
+
+    @property
+    def best_estimated(self) -> Estimate | None:
+        """The told theta whose cost without noise is believed to be the lowest, and how sure that is; None before any.
+
+        Of trials that kept all limits. The luckiest of many noisy costs is too good to be true; this is not.
+        """
+        best = self.best
+        if best is None or best.cost is None:
+            return None
+        done = [i for i, trial in enumerate(self.trials) if trial.cost is not None]
+        if len(done) < 2:
+            return Estimate(self.trials.index(best), best.theta, best.cost, best.cost, best.cost)
+        return self._believe().estimate(self._history.keeps_limits)
 
     @property
     def timings(self) -> Timings:
@@ -144,23 +188,49 @@ class Optimizer:
         Lengthscales are in the unit cube, under "lengthscale:NAME"; mean, variance and noise (a variance)
         refer to the standardised targets.
         """
-        if self._fitted is None:
+        if self._belief is None:
             return {}
-        hyper = self._fitted[1].hyperparameters
+        hyper = self._belief.cost.hyperparameters
         named = {"mean": hyper.mean, "variance": hyper.variance, "noise": hyper.noise}
         for name, value in zip(self.space.names, hyper.lengthscales, strict=True):
             named[f"lengthscale:{name}"] = float(value)
         return named
 
-    def ask(self) -> NDArray:
-        """Return the next theta (d,), inside the bounds; it depends on the told trials only."""
-        count = len(self.trials)
-        if self._asked is None or self._asked[0] != count:
-            self._asked = (count, self._next())
+    def ask(self, pending: Sequence[ArrayLike] = ()) -> NDArray:
+        """Return the next theta (d,), inside the bounds.
+
+        Parameters
+        ----------
+        pending : sequence of array-like (d,), optional
+            Thetas that are asked and not yet told, in the order of asking: experiments that run at the same time.
+            The merit of the next one is averaged over what may come out of them (Snoek, Larochelle and Adams 2012,
+            "Practical Bayesian optimization of machine learning algorithms", section 3.2).
+        """
+        waiting = np.array([self.space.check(theta) for theta in pending]).reshape(-1, self.space.dimension)
+        state = (len(self.trials), waiting.tobytes())
+        if self._asked is None or self._asked[0] != state:
+            self._asked = (state, self._next(waiting))
         return self._asked[1].copy()
 
-    def tell(self, theta: ArrayLike, cost: float | None = None, *, failed: bool = False) -> None:
-        """Record a trial.
+    def ask_batch(self, count: int, pending: Sequence[ArrayLike] = ()) -> NDArray:
+        """Return `count` thetas (count, d) for experiments that run side by side: each is asked with those before it
+        pending."""
+        asked: list[ArrayLike] = []
+        for _ in range(_count("count", count)):
+            asked.append(self.ask([*pending, *asked]))
+        return np.array(asked)
+
+    def tell(
+        self,
+        theta: ArrayLike,
+        cost: float | None = None,
+        *,
+        failed: bool = False,
+        at_least: float | None = None,
+        measured: Mapping[str, float] | None = None,
+        deviation: float | None = None,
+    ) -> None:
+        """Record a trial: its cost, or that it failed, or what its cost is at least.
 
         Parameters
         ----------
@@ -170,59 +240,128 @@ class Optimizer:
             J, to be minimised.
         failed : bool
             The experiment gave no cost.
+        at_least : float, optional
+            The experiment was cut: J is at least this.
+        measured : mapping of str to float, optional
+            Value of each quantity that has a limit; all of them with a cost.
+        deviation : float, optional
+            Standard deviation of this cost's noise, in its unit, where it is known.
 
         Raises
         ------
         ValueError
-            A theta that `Space.check` refuses; a cost that is not finite, missing, told together with
-            failed=True, or not positive when log J is modelled. Nothing is recorded then.
+            A theta that `Space.check` refuses; a number that is not finite; anything but one of cost, failed and
+            at_least; a quantity without a limit, or one with a limit missing; J <= 0 where its logarithm is modelled.
+            Nothing is recorded then.
         """
-        trial = self._history.check(theta, cost, failed)
-        if trial.cost is not None:
-            self._transform.check(trial.cost)
+        trial = self._history.check(theta, cost, failed, at_least, measured, deviation)
+        for value in (trial.cost, trial.at_least):
+            if value is not None:
+                self._transform.check(value)
         self._history.append(trial)
 
     def predict(self, theta: ArrayLike) -> tuple[float, float]:
-        """Return mean and standard deviation of the transformed cost, without noise; see `transform`.
+        """Return mean and standard deviation of the transformed cost, without noise.
+
+        The scale is that of the transform, whose unit and origin follow the costs told: good for comparing thetas.
 
         Raises
         ------
         ValueError
             While no told trial has a cost.
         """
-        if self.best is None:
+        if not any(trial.cost is not None for trial in self.trials):
             raise ValueError("nothing can be predicted: tell a trial with a cost first")
-        posterior, aim = self._model()
-        mean, std = posterior.predict(self.space.to_unit(theta)[None, :])
-        return aim.location + aim.scale * float(mean[0]), aim.scale * float(std[0])
+        belief = self._believe()
+        mean, std = belief.cost.predict(self.space.to_unit(theta)[None, :])
+        return belief.data.location + belief.data.scale * float(mean[0, 0]), belief.data.scale * float(std[0])
 
-    def _next(self) -> NDArray:
-        count = len(self.trials)
+    def _next(self, waiting: NDArray) -> NDArray:
+        told = len(self.trials)
+        count = told + len(waiting)
         self._timings = Timings()
         if count < len(self._initial):
             return self._initial[count]
-        if count < self._seed_points or self.best is None:
-            return self.space.from_unit(self._sobol[count - len(self._initial)])
+        if count < self._seed_points or not any(trial.cost is not None for trial in self.trials):
+            return self._sobol[count - len(self._initial)]
         import_gpy()
         start = time.perf_counter()
-        posterior, aim = self._model()
+        belief = self._believe()
         fitted = time.perf_counter()
-        order = np.argsort(aim.values, kind="stable")[:_INCUMBENTS]
+        # Matrices this small only lose time on threads, and last bits with their number.
         with threadpool_limits(1):
-            unit = maximise(self._acquisition, posterior, aim.best, posterior.points[order], self._generator(1))
+            unit = self._maximise(belief, np.array([self.space.to_unit(theta) for theta in waiting]))
         self._timings = Timings(fitted - start, time.perf_counter() - fitted)
         return self.space.from_unit(unit)
 
-    def _model(self) -> tuple[Posterior, Targets]:
-        count = len(self.trials)
-        if self._fitted is None or self._fitted[0] != count:
-            points = np.array([self.space.to_unit(trial.theta) for trial in self.trials])
-            aim = targets(self.trials, self._transform)
-            # Matrices this small only lose time on threads, and last bits with their number.
-            with threadpool_limits(1):
-                posterior = fit(points, aim.values, self._fit_settings, self._generator(0))
-            self._fitted = (count, posterior, aim)
-        return self._fitted[1:]
+    def _maximise(self, belief: Belief, waiting: NDArray) -> NDArray:
+        rng = self._generator(1, len(waiting))
+        kept = belief.rows_that(self._history.keeps_limits)
+        constraints = self._constraints(belief)
+        taken = belief.units
+        order = np.argsort(belief.data.targets, kind="stable")
+        if len(kept):
+            order = kept[np.argsort(belief.data.targets[kept], kind="stable")]
+            cost, best = self._worlds(belief, kept, waiting, rng)
+            merit = Merit(self._acquisition, cost, best, constraints)
+        else:
+            merit = Merit(self._acquisition, None, np.zeros(1), constraints)
+        incumbents = belief.data.points[order[:_INCUMBENTS]]
+        if len(waiting):
+            taken = np.vstack([taken, waiting])
+        unit, value = maximise(merit, taken, incumbents, rng, lambda x: self._may_ask(self.space.from_unit(x)))
+        if len(kept) and not len(waiting) and belief.noisy:
+            told = belief.data.points[kept]
+            again = merit(told)
+            if again.max() > value and self._may_ask(self.space.from_unit(told[again.argmax()])):
+                return told[again.argmax()]
+        return unit
 
-    def _generator(self, purpose: int) -> np.random.Generator:
-        return np.random.default_rng([self._seed, len(self.trials), purpose])
+    def _worlds(
+        self, belief: Belief, kept: NDArray, waiting: NDArray, rng: np.random.Generator
+    ) -> tuple[Posterior, NDArray]:
+        """The cost's process and the best in each world of what is not known: costs to come, and noise."""
+        if self._acquisition.noisy:
+            cost = belief.hidden(waiting, _HIDDEN_WORLDS, rng)
+            rivals = np.vstack([belief.data.points[kept], waiting]) if len(waiting) else belief.data.points[kept]
+            return cost, cost.predict(rivals)[0].min(axis=0)
+        observed = belief.data.targets[kept].min()
+        if not len(waiting):
+            return belief.cost, np.array([observed])
+        cost = belief.imagined(waiting, _FANTASIES, rng)
+        return cost, np.minimum(observed, cost.predict(waiting)[0].min(axis=0))
+
+    def _may_ask(self, theta: NDArray) -> bool:
+        return self._admissible is None or bool(self._admissible(theta))
+
+    def _constraints(self, belief: Belief) -> list[Constraint]:
+        found = [Constraint(belief.failure, 0.0, 1.0)] if belief.failure is not None else []
+        return found + [Constraint(posterior, limit) for posterior, limit in belief.limited]
+
+    def _believe(self) -> Belief:
+        """What the told trials say: fitted once for each number of them."""
+        told = len(self.trials)
+        if self._belief is None or len(self._belief.trials) != told:
+            with threadpool_limits(1):
+                self._belief = self._believer.belief(self.trials, self._start(last_full_fit(told)))
+        return self._belief
+
+    def _start(self, full: int) -> Start | None:
+        """Where the descent starts: at what the last full fit found, None where this is one."""
+        before = self.trials[:full]
+        if full == len(self.trials) or not any(trial.cost is not None for trial in before):
+            return None
+        if self._full is None or self._full[0] != full:
+            known = self._belief
+            at_hand = known is not None and len(known.trials) == full
+            self._full = (full, known.found if known and at_hand else self._believer.cost(before, None)[2])
+        return self._full[1]
+
+    def _generator(self, *purpose: int) -> np.random.Generator:
+        return np.random.default_rng([self._seed, len(self.trials), *purpose])
+
+
+def _count(name: str, value: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        raise ValueError(f"{name} is {value!r}: it must be an integer, 1 or more")
+    return int(value)

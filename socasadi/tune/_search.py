@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
@@ -22,19 +24,79 @@ class Search(Protocol):
     @property
     def best(self) -> Trial | None: ...
     @property
+    def best_estimated(self) -> Estimate | None: ...
+    @property
     def timings(self) -> Timings: ...
 
-    def ask(self) -> NDArray: ...
-    def tell(self, theta: ArrayLike, cost: float | None = None, *, failed: bool = False) -> None: ...
+    def ask(self, pending: Sequence[ArrayLike] = ()) -> NDArray: ...
+
+    def tell(
+        self,
+        theta: ArrayLike,
+        cost: float | None = None,
+        *,
+        failed: bool = False,
+        at_least: float | None = None,
+        measured: Mapping[str, float] | None = None,
+        deviation: float | None = None,
+    ) -> None: ...
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One told experiment: `theta` (d,), read-only, and its `cost`, which is None when it `failed`."""
+    """One told experiment.
+
+    Parameters
+    ----------
+    theta : ndarray (d,)
+        Read-only.
+    cost : float or None
+        None when it failed or was cut.
+    at_least : float or None
+        What the cost is at least, of an experiment that was cut.
+    measured : mapping
+        Values of limited quantities, by name.
+    deviation : float or None
+        Standard deviation of this cost's noise, where it is known.
+    """
 
     theta: NDArray
     cost: float | None
-    failed: bool
+    at_least: float | None = None
+    measured: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    deviation: float | None = None
+
+    @property
+    def known(self) -> float | None:
+        """The cost, or what it is at least; None of an experiment that failed."""
+        return self.at_least if self.cost is None else self.cost
+
+    @property
+    def failed(self) -> bool:
+        """Whether the experiment gave neither a cost nor a bound of it."""
+        return self.known is None
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The told theta whose cost without noise is believed to be the lowest.
+
+    Parameters
+    ----------
+    index : int
+        Of its trial, from 0.
+    theta : ndarray (d,)
+    cost : float
+        The median of what is believed.
+    low, high : float
+        Between these the cost lies with a probability of 90 %.
+    """
+
+    index: int
+    theta: NDArray
+    cost: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -51,36 +113,62 @@ class History:
     Every search keeps one; all that it asks follows from its settings and this history.
     """
 
-    def __init__(self, space: Space) -> None:
+    def __init__(self, space: Space, limits: Mapping[str, float] | None = None) -> None:
         self.space = space
+        self.limits = {name: _number(f"the limit of {name!r}", limit) for name, limit in (limits or {}).items()}
         self.trials: tuple[Trial, ...] = ()
 
-    def check(self, theta: ArrayLike, cost: float | None, failed: bool) -> Trial:
+    def check(
+        self,
+        theta: ArrayLike,
+        cost: float | None,
+        failed: bool,
+        at_least: float | None,
+        measured: Mapping[str, float] | None,
+        deviation: float | None,
+    ) -> Trial:
         """Return the trial that is told, or raise ValueError with one sentence when it contradicts itself."""
         values = self.space.check(theta)
-        if failed and cost is not None:
-            raise ValueError(f"a failed trial was told with the cost {cost}: tell a cost or failed=True")
-        if not failed and cost is None:
-            raise ValueError("a trial was told without a cost: tell a cost, or failed=True")
+        if (cost is not None) + (at_least is not None) + bool(failed) != 1:
+            told = f"cost={cost!r}, at_least={at_least!r}, failed={failed!r}"
+            raise ValueError(f"a trial was told with {told}: tell a cost, or at_least, or failed=True")
         if cost is not None:
-            try:
-                cost = float(cost)
-            except (TypeError, ValueError) as error:
-                raise ValueError(f"the cost must be a number, not {cost!r}") from error
-            if not math.isfinite(cost):
-                raise ValueError(f"the cost is {cost}: tell failed=True for a trial that has no finite cost")
+            cost = _number("the cost", cost, "; tell failed=True for a trial that has no finite cost")
+        if at_least is not None:
+            at_least = _number("the least cost of a trial that was cut", at_least)
+        measured = {name: _number(name, value) for name, value in (measured or {}).items()}
+        if unknown := sorted(set(measured) - set(self.limits)):
+            raise ValueError(f"{unknown[0]!r} was measured, but the limits are on {sorted(self.limits)}")
+        if cost is not None and (missing := sorted(set(self.limits) - set(measured))):
+            raise ValueError(f"there is a limit on {missing[0]!r}: tell it, measured={{{missing[0]!r}: ...}}")
+        if deviation is not None and _number("the deviation", deviation) < 0:
+            raise ValueError(f"the deviation of the cost is {deviation}: it cannot be negative")
         values.setflags(write=False)
-        return Trial(values, cost, bool(failed))
+        return Trial(values, cost, at_least, MappingProxyType(measured), deviation)
 
     def append(self, trial: Trial) -> None:
         """Record a checked trial."""
         self.trials = (*self.trials, trial)
 
+    def keeps_limits(self, trial: Trial) -> bool:
+        """Whether the trial has a cost and nothing measured was beyond its limit."""
+        return trial.cost is not None and all(trial.measured[name] <= limit for name, limit in self.limits.items())
+
     @property
     def best(self) -> Trial | None:
-        """The first trial with the lowest cost; None while nothing but failures is known."""
-        done = [trial for trial in self.trials if trial.cost is not None]
+        """The first trial with the lowest cost of those that kept all limits; None while there is none."""
+        done = [trial for trial in self.trials if self.keeps_limits(trial)]
         return min(done, key=lambda trial: trial.cost if trial.cost is not None else np.inf, default=None)
+
+
+def _number(what: str, value: float, hint: str = "") -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{what} must be a number, not {value!r}{hint}") from error
+    if not math.isfinite(number):
+        raise ValueError(f"{what} is {number}: it must be finite{hint}")
+    return number
 
 
 def check_seed(seed: int) -> int:

@@ -2,28 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import qmc
 
-from ._search import History, Timings, Trial, check_seed
+from ._search import Estimate, History, Timings, Trial, check_seed
 from ._space import Space
+
+# Points of the sequence tried for each that may be asked, before the box is called empty.
+_PATIENCE = 5000
 
 
 class SobolPoints:
-    """Points 0, 1, 2, ... of one scrambled Sobol sequence in the unit cube, the same for the same seed."""
+    """The admissible ones among the points of one scrambled Sobol sequence, the same for the same seed."""
 
-    def __init__(self, dimension: int, seed: int) -> None:
-        self._dimension, self._seed = dimension, seed
+    def __init__(self, space: Space, seed: int, admissible: Callable[[NDArray], bool] | None = None) -> None:
+        self._space, self._seed, self._admissible = space, seed, admissible
         self._points = self._draw(5)
+        self._kept: list[NDArray] = []
+        self._seen = 0
 
     def _draw(self, log2_count: int) -> NDArray:
-        return qmc.Sobol(self._dimension, rng=np.random.default_rng(self._seed)).random_base2(log2_count)
+        return qmc.Sobol(self._space.dimension, rng=np.random.default_rng(self._seed)).random_base2(log2_count)
 
     def __getitem__(self, index: int) -> NDArray:
-        if index >= len(self._points):
-            self._points = self._draw(index.bit_length())
-        return self._points[index]
+        """Theta of that index (d,); ValueError when the conditions leave nothing of the box."""
+        patience = self._seen + _PATIENCE
+        while len(self._kept) <= index:
+            if self._seen >= patience:
+                raise ValueError(
+                    f"none of {_PATIENCE} points of the box keeps the conditions: widen the bounds, or loosen them"
+                )
+            if self._seen >= len(self._points):
+                self._points = self._draw(self._seen.bit_length())
+            theta = self._space.from_unit(self._points[self._seen])
+            self._seen += 1
+            if self._admissible is None or self._admissible(theta):
+                self._kept.append(theta)
+        return self._kept[index]
 
 
 class SobolSearch:
@@ -34,11 +52,20 @@ class SobolSearch:
     space : Space
     seed : int
         Scrambling of the sequence; an `Optimizer` of the same seed starts with the same points.
+    limits, admissible
+        As of `Optimizer`.
     """
 
-    def __init__(self, space: Space, seed: int = 0) -> None:
-        self._history = History(space)
-        self._points = SobolPoints(space.dimension, check_seed(seed))
+    def __init__(
+        self,
+        space: Space,
+        seed: int = 0,
+        *,
+        limits: Mapping[str, float] | None = None,
+        admissible: Callable[[NDArray], bool] | None = None,
+    ) -> None:
+        self._history = History(space, limits)
+        self._points = SobolPoints(space, check_seed(seed), admissible)
 
     @property
     def space(self) -> Space:
@@ -52,18 +79,35 @@ class SobolSearch:
 
     @property
     def best(self) -> Trial | None:
-        """The best observed trial that did not fail, or None."""
+        """The best observed trial, or None."""
         return self._history.best
+
+    @property
+    def best_estimated(self) -> Estimate | None:
+        """The best observed trial, as it was observed: nothing is estimated here."""
+        best = self.best
+        if best is None or best.cost is None:
+            return None
+        return Estimate(self.trials.index(best), best.theta, best.cost, best.cost, best.cost)
 
     @property
     def timings(self) -> Timings:
         """Zeros: nothing is fitted."""
         return Timings()
 
-    def ask(self) -> NDArray:
-        """Return the next theta (d,): the point whose index is the number of trials told so far."""
-        return self.space.from_unit(self._points[len(self.trials)])
+    def ask(self, pending: Sequence[ArrayLike] = ()) -> NDArray:
+        """Return the next theta (d,): the point whose index is the number of trials told so far and pending."""
+        return self._points[len(self.trials) + len(pending)].copy()
 
-    def tell(self, theta: ArrayLike, cost: float | None = None, *, failed: bool = False) -> None:
+    def tell(
+        self,
+        theta: ArrayLike,
+        cost: float | None = None,
+        *,
+        failed: bool = False,
+        at_least: float | None = None,
+        measured: Mapping[str, float] | None = None,
+        deviation: float | None = None,
+    ) -> None:
         """Record a trial; see `Optimizer.tell`."""
-        self._history.append(self._history.check(theta, cost, failed))
+        self._history.append(self._history.check(theta, cost, failed, at_least, measured, deviation))

@@ -1,11 +1,16 @@
-"""Expected improvement and its logarithm against numerical integration."""
+"""Merits of one point: expected improvement and its logarithm against numerical integration, the confidence bound."""
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from socasadi.tune import expected_improvement, log_expected_improvement
+from socasadi.tune.acquisition import (
+    acquisition_named,
+    confidence_bound,
+    expected_improvement,
+    log_expected_improvement,
+)
 
 
 def integral(mean, std, best):
@@ -31,6 +36,13 @@ def test_ei_is_the_mean_of_the_improvement_below_the_best(mean, std):
     )
 
 
+def test_ei_is_what_a_million_draws_improve_on_average():
+    draws = np.random.default_rng(0).normal(0.8, 0.6, 1_000_000)
+    gains = np.maximum(0.5 - draws, 0.0)
+    value = float(expected_improvement(np.array(0.8), np.array(0.6), 0.5)[0])
+    assert value == pytest.approx(gains.mean(), abs=4 * gains.std() / 1000)
+
+
 @pytest.mark.parametrize("z", [-0.5, -5.0, -30.0, -59.9, -60.1, -1e3, -1e5, -1e8])
 def test_log_ei_is_accurate_where_ei_underflows(z):
     std = 0.7
@@ -45,40 +57,45 @@ def test_a_certain_improvement_is_the_difference_of_the_means():
     assert float(by_std) == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("z", [30.0, 2.0, 0.0, -1.0, -20.0, -59.0, -61.0, -1e3])
-def test_derivatives_of_log_ei_are_those_of_its_value(z):
-    std = 0.7
-    h = 1e-6 / max(1.0, abs(z))
+FUNCTIONS = {"ei": expected_improvement, "log_ei": log_expected_improvement, "ucb": confidence_bound}
+
+
+@pytest.mark.parametrize(
+    ("name", "z"),
+    [("log_ei", z) for z in (30.0, 2.0, 0.0, -1.0, -20.0, -59.0, -61.0, -1e3)]
+    + [("ei", z) for z in (3.0, 0.0, -2.0)]
+    + [("ucb", z) for z in (30.0, 3.0, 0.0, -2.0, -30.0)],
+)
+def test_derivatives_are_those_of_the_value(name, z):
+    function, std, h = FUNCTIONS[name], 0.7, 1e-6 / max(1.0, abs(z))
 
     def value(mean, std):
-        return log_expected_improvement(np.array(mean), np.array(std), 0.0)[0]
+        return function(np.array(mean), np.array(std), 0.0)[0]
 
-    _, by_mean, by_std = log_expected_improvement(np.array(-z * std), np.array(std), 0.0)
     mean = -z * std
+    _, by_mean, by_std = function(np.array(mean), np.array(std), 0.0)
     np.testing.assert_allclose(by_mean, (value(mean + h, std) - value(mean - h, std)) / (2 * h), rtol=2e-4, atol=1e-8)
     np.testing.assert_allclose(by_std, (value(mean, std + h) - value(mean, std - h)) / (2 * h), rtol=2e-4, atol=1e-8)
 
 
-@pytest.mark.parametrize("z", [3.0, 0.0, -2.0])
-def test_derivatives_of_ei_are_those_of_its_value(z):
-    std, h = 0.7, 1e-6
-    mean = -z * std
-    _, by_mean, by_std = expected_improvement(np.array(mean), np.array(std), 0.0)
-    numerical_mean = (
-        expected_improvement(np.array(mean + h), np.array(std), 0.0)[0]
-        - expected_improvement(np.array(mean - h), np.array(std), 0.0)[0]
-    ) / (2 * h)
-    numerical_std = (
-        expected_improvement(np.array(mean), np.array(std + h), 0.0)[0]
-        - expected_improvement(np.array(mean), np.array(std - h), 0.0)[0]
-    ) / (2 * h)
-    np.testing.assert_allclose([by_mean, by_std], [numerical_mean, numerical_std], rtol=1e-6, atol=1e-9)
-
-
-def test_less_mean_or_more_deviation_is_always_preferred():
+@pytest.mark.parametrize("name", ["log_ei", "ucb"])
+def test_less_mean_or_more_deviation_is_always_preferred(name):
     z = np.linspace(-200, 20, 2001)
     std = np.full_like(z, 0.3)
-    value, by_mean, by_std = log_expected_improvement(-z * std, std, 0.0)
+    value, by_mean, by_std = FUNCTIONS[name](-z * std, std, 0.0)
+    assert np.isfinite(value).all()
     assert np.all(np.diff(value) > 0)
     assert np.all(by_mean < 0)
     assert np.all(by_std >= 0)
+
+
+def test_the_confidence_bound_orders_points_by_mean_less_two_deviations():
+    rng = np.random.default_rng(0)
+    mean, std = rng.normal(size=200), rng.uniform(0.01, 2.0, 200)
+    merit = confidence_bound(mean, std, 0.3)[0]
+    np.testing.assert_array_equal(np.argsort(-merit), np.argsort(mean - 2 * std))
+
+
+def test_an_acquisition_that_is_not_known_is_refused_with_the_known_ones():
+    with pytest.raises(ValueError, match="unknown acquisition 'pi'; known are 'log_ei', 'ei', 'noisy_ei', 'ucb'"):
+        acquisition_named("pi")

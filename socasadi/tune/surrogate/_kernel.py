@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ._named import choose
+from .._named import choose
 
 
 class Shape(Protocol):
@@ -35,7 +35,10 @@ def matern52(squared: NDArray) -> tuple[NDArray, NDArray]:
 
 @dataclass(frozen=True)
 class Kernel:
-    """A kernel by name: its shape here, and the name of its class in GPy.kern."""
+    """A kernel: its shape here, and the name of its class in GPy.kern.
+
+    A further one is a `Kernel` added to `KERNELS`: any stationary class of GPy with `variance` and `lengthscale`.
+    """
 
     shape: Shape
     gpy: str

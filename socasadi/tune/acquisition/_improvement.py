@@ -2,28 +2,45 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erfcx, ndtr
+from scipy.special import erfcx, expit, ndtr
 
-from ._named import choose
+from .._named import choose
 
 _LOG_SQRT_2PI = 0.5 * np.log(2.0 * np.pi)
 # Below this z, 1 + z m(z) loses more to cancellation (z^2 eps) than its asymptotic series to truncation.
 _SERIES = -60.0
 
+# Deviations below the mean, of the confidence bound.
+_CONFIDENCE = 2.0
 
-class Acquisition(Protocol):
-    """A function to maximise, for minimisation of the cost."""
-
-    def __call__(self, mean: NDArray, std: NDArray, best: float) -> tuple[NDArray, NDArray, NDArray]:
-        """Return the value and its derivatives with respect to mean and std, all of the shape of `mean`."""
-        ...
+Partials = tuple[NDArray, NDArray, NDArray]
 
 
-def expected_improvement(mean: NDArray, std: NDArray, best: float) -> tuple[NDArray, NDArray, NDArray]:
+@dataclass(frozen=True)
+class Acquisition:
+    """A merit to maximise, for minimisation of the cost.
+
+    Parameters
+    ----------
+    function : callable
+        (mean, std, best) to the merit and its derivatives with respect to mean and std, all of one shape.
+    logarithm : bool
+        The merit is the logarithm of something positive.
+    noisy : bool
+        It is to be averaged over what the noise may have hidden at the points already told.
+    """
+
+    function: Callable[[NDArray, NDArray, NDArray | float], Partials]
+    logarithm: bool = True
+    noisy: bool = False
+
+
+def expected_improvement(mean: NDArray, std: NDArray, best: NDArray | float) -> Partials:
     """EI = E[max(J* - f, 0)] and its partial derivatives.
 
     EI = (J* - mean) Phi(z) + std phi(z), z = (J* - mean)/std:
@@ -31,8 +48,9 @@ def expected_improvement(mean: NDArray, std: NDArray, best: float) -> tuple[NDAr
 
     Parameters
     ----------
-    mean, std : ndarray, same shape
-    best : float
+    mean, std : ndarray
+        Of shapes that broadcast.
+    best : float or ndarray
         J*, the best value so far, on the same scale.
     """
     z = (best - mean) / std
@@ -41,7 +59,7 @@ def expected_improvement(mean: NDArray, std: NDArray, best: float) -> tuple[NDAr
     return np.maximum((best - mean) * Phi + std * phi, 0.0), -Phi, phi
 
 
-def log_expected_improvement(mean: NDArray, std: NDArray, best: float) -> tuple[NDArray, NDArray, NDArray]:
+def log_expected_improvement(mean: NDArray, std: NDArray, best: NDArray | float) -> Partials:
     """log EI and its partial derivatives, accurate where EI itself underflows.
 
     EI = std phi(z) q with q = 1 + z m and m = Phi(z)/phi(z) (the reciprocal of the inverse Mills ratio). For
@@ -70,7 +88,25 @@ def log_expected_improvement(mean: NDArray, std: NDArray, best: float) -> tuple[
     )
 
 
-ACQUISITIONS: dict[str, Acquisition] = {"log_ei": log_expected_improvement, "ei": expected_improvement}
+def confidence_bound(mean: NDArray, std: NDArray, best: NDArray | float) -> Partials:
+    """How far the lower confidence bound mean - 2 std lies below the best, made positive, and its logarithm taken.
+
+    log log(1 + exp(best - mean + 2 std)) increases with the bound's depth, so that its maximum is the bound's minimum
+    (the upper confidence bound of Srinivas et al. 2010, for a cost); being the logarithm of something positive it can
+    be weighed with a probability.
+    """
+    depth = best - mean + _CONFIDENCE * std
+    positive = np.logaddexp(0.0, depth)
+    slope = expit(depth) / positive
+    return np.log(positive), -slope, _CONFIDENCE * slope
+
+
+ACQUISITIONS: dict[str, Acquisition] = {
+    "log_ei": Acquisition(log_expected_improvement),
+    "ei": Acquisition(expected_improvement, logarithm=False),
+    "noisy_ei": Acquisition(log_expected_improvement, noisy=True),
+    "ucb": Acquisition(confidence_bound),
+}
 
 
 def acquisition_named(name: str) -> Acquisition:

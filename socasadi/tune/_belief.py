@@ -1,0 +1,203 @@
+"""What a list of told trials says: of the cost, of the limited quantities, of where experiments fail."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._search import Estimate, Trial
+from ._space import Space
+from .surrogate import (
+    Data,
+    FitSettings,
+    Hyperparameters,
+    Posterior,
+    Transform,
+    classify,
+    condition,
+    cost_data,
+    evidence,
+    plain_data,
+    surrogate,
+    transform_named,
+)
+
+# A value drawn at a told point is exact; so much of the variance keeps the matrix regular.
+_EXACT = 1e-6
+_SIDE = 1.645  # deviations of a normal distribution between which 90 % lie
+
+
+# So many trials, and each multiple of the period after them, get a full fit; between, the descent starts at its result.
+_ALL_FULL = 30
+_PERIOD = 5
+
+
+def last_full_fit(told: int) -> int:
+    """The number of trials, of `told` ones, whose fit had all its starts."""
+    return told if told <= _ALL_FULL else told - told % _PERIOD
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """What a fit found: which way of the transform, and the hyperparameters."""
+
+    way: int
+    hyperparameters: Hyperparameters
+
+
+@dataclass(frozen=True, eq=False)
+class Believer:
+    """How told trials are made into processes; what it finds is a pure function of them.
+
+    Parameters
+    ----------
+    space, transform, settings, limits, active_set, seed
+        As of the optimiser.
+    """
+
+    space: Space
+    transform: Transform
+    settings: FitSettings
+    limits: Mapping[str, float]
+    active_set: int
+    seed: int
+
+    def units(self, trials: Sequence[Trial]) -> NDArray:
+        """The thetas of the trials in the unit cube (n, d)."""
+        return np.array([self.space.to_unit(trial.theta) for trial in trials])
+
+    def cost(self, trials: Sequence[Trial], start: Start | None) -> tuple[Data, Posterior, Start]:
+        """The cost's process, of which one trial at least has told a cost, and where the next descent may start."""
+        units = self.units(trials)
+        ways = len(self.transform.ways(np.array([trial.known for trial in trials if trial.known is not None])))
+        # A way that only positive costs can go ends with the first one that is not.
+        way = self._way(trials, units, ways) if start is None or start.way >= ways else start.way
+        rng = np.random.default_rng([self.seed, len(trials), 0])
+        hyper = None if start is None else start.hyperparameters
+        data, cost = surrogate(self._data(trials, units, way), self.settings, rng, hyper)
+        return data, cost, Start(way, cost.hyperparameters)
+
+    def _data(self, trials: Sequence[Trial], units: NDArray, way: int) -> Data:
+        data = cost_data(trials, units, self.transform, way)
+        rng = np.random.default_rng([self.seed, len(trials), 3])
+        return data.subset(_active(data.targets, self.active_set, rng))
+
+    def _way(self, trials: Sequence[Trial], units: NDArray, ways: int) -> int:
+        """Which way makes the costs most probable: by the evidence of its targets times the slopes."""
+        if ways == 1:
+            return 0
+        scores = []
+        for way in range(ways):
+            data = self._data(trials, units, way)
+            data = data.subset(~data.bound)
+            scores.append(evidence(data.points, data.targets, self.settings, data.known) + data.log_slopes.sum())
+        return int(np.argmax(scores))
+
+    def belief(self, trials: Sequence[Trial], start: Start | None) -> Belief:
+        """All that the trials say."""
+        units = self.units(trials)
+        data, cost, found = self.cost(trials, start)
+        failed = np.array([trial.failed for trial in trials])
+        failure = None
+        if failed.any():
+            rng = np.random.default_rng([self.seed, len(trials), 1])
+            rows = _active(np.where(failed, 0.0, 1.0), self.active_set, rng)
+            failure = classify(units[rows], failed[rows], self.settings.kernel)
+        limited = [self._limited(name, trials, units) for name in self.limits]
+        return Belief(trials, units, data, cost, found, failure, limited)
+
+    def _limited(self, name: str, trials: Sequence[Trial], units: NDArray) -> tuple[Posterior, float]:
+        rows = [i for i, trial in enumerate(trials) if name in trial.measured]
+        data = plain_data(rows, [trials[i].measured[name] for i in rows], units, transform_named("yeo-johnson"))
+        limit = float(data.standardise(np.array([self.limits[name]]))[0])
+        rng = np.random.default_rng([self.seed, len(trials), 2])
+        near = _active(np.abs(data.targets - limit), self.active_set, rng)
+        _, posterior = surrogate(data.subset(near), FitSettings(restarts=1), rng)
+        return posterior, limit
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """The fitted processes.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+    units : ndarray (n, d)
+        Their thetas in the unit cube.
+    data : Data
+        What the cost's process was fitted to.
+    cost : Posterior
+    found : Start
+        Where the next descent may start.
+    failure : Posterior or None
+        Latent value of failure (see `classify`); None while nothing failed.
+    limited : list of (Posterior, float)
+        Process of each limited quantity, with its limit on the same scale.
+    """
+
+    trials: Sequence[Trial]
+    units: NDArray
+    data: Data
+    cost: Posterior
+    found: Start
+    failure: Posterior | None
+    limited: list[tuple[Posterior, float]]
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the cost may have noise: a point told twice with one and the same cost says that it has none."""
+        seen: dict[bytes, float] = {}
+        for trial in self.trials:
+            if trial.cost is None:
+                continue
+            place = trial.theta.tobytes()
+            if place in seen and abs(seen[place] - trial.cost) <= 1e-10 * abs(trial.cost):
+                return False
+            seen[place] = trial.cost
+        return True
+
+    def rows_that(self, keep: Callable[[Trial], bool]) -> NDArray:
+        """Indices into the data of the trials with that property."""
+        return np.array([i for i, row in enumerate(self.data.rows) if keep(self.trials[row])], dtype=int)
+
+    def estimate(self, keep: Callable[[Trial], bool]) -> Estimate:
+        """The trial of least expected cost among those with that property."""
+        rows = self.rows_that(keep)
+        mean, std = self.cost.predict(self.data.points[rows])
+        least = int(mean[:, 0].argmin())
+        index = int(self.data.rows[rows[least]])
+        middle, spread = float(mean[least, 0]), _SIDE * float(std[least])
+        cost, low, high = self.data.restore(np.array([middle, middle - spread, middle + spread]))
+        return Estimate(index, self.trials[index].theta, float(cost), float(low), float(high))
+
+    def imagined(self, points: NDArray, worlds: int, rng: np.random.Generator) -> Posterior:
+        """The cost's process in worlds where costs were observed at further points (m, d), drawn from it."""
+        noise = self.cost.hyperparameters.noise
+        drawn = self.cost.sample(points, worlds, rng)
+        drawn += np.sqrt(noise) * rng.standard_normal(drawn.shape)
+        told = np.tile(self.data.targets[:, None], (1, worlds))
+        return condition(
+            self.cost.hyperparameters,
+            np.vstack([self.cost.points, points]),
+            np.vstack([told, drawn]),
+            np.concatenate([noise + self.data.known, np.full(len(points), noise)]),
+        )
+
+    def hidden(self, points: NDArray, worlds: int, rng: np.random.Generator) -> Posterior:
+        """The cost's process in worlds where the costs without noise are known, at the told and at further points."""
+        known = np.vstack([self.cost.points, points]) if len(points) else self.cost.points
+        drawn = self.cost.sample(known, worlds, rng)
+        return condition(self.cost.hyperparameters, known, drawn, _EXACT * self.cost.hyperparameters.variance)
+
+
+def _active(values: NDArray, size: int, rng: np.random.Generator) -> NDArray:
+    """Indices of the data that are used: all, or the lower half of `size` and a random choice of the others."""
+    if len(values) <= size:
+        return np.arange(len(values))
+    order = np.argsort(values, kind="stable")
+    half = size - size // 2
+    return np.sort(np.concatenate([order[:half], rng.choice(order[half:], size // 2, replace=False)]))

@@ -1,0 +1,66 @@
+"""Where experiments fail: a Gaussian process of a latent value behind success and failure, by Laplace's method."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._evidence import KernelMatrix, descend, import_gpy, kernel_bounds, lengthscale_penalty
+from ._posterior import Hyperparameters, Posterior
+
+_START_VARIANCE = 4.0
+
+
+class _Loss:
+    """Minus the log posterior density of z = log variance, log lengthscales, given which points failed."""
+
+    def __init__(self, points: NDArray, failed: NDArray, kernel: str) -> None:
+        gpy = import_gpy()
+        self.points, self.labels = points, failed.astype(float)[:, None]
+        self.matrix = KernelMatrix(kernel, points.shape[1])
+        self.likelihood = gpy.likelihoods.Bernoulli()
+        self.inference = gpy.inference.latent_function_inference.Laplace()
+
+    def infer(self, z: NDArray) -> tuple[object, float, dict[str, NDArray]]:
+        self.matrix.set(z)
+        posterior, evidence, by = self.inference.inference(
+            self.matrix.kernel, self.points, self.likelihood, self.labels
+        )
+        return posterior, float(np.squeeze(evidence)), by
+
+    def __call__(self, z: NDArray) -> tuple[float, NDArray]:
+        try:
+            _, evidence, by = self.infer(z)
+        except np.linalg.LinAlgError:
+            return 1e10, np.zeros_like(z)
+        gradient = -self.matrix.gradient(by["dL_dK"], self.points)
+        penalty, slope = lengthscale_penalty(z[1:])
+        gradient[1:] += slope
+        return penalty - evidence, gradient
+
+
+def classify(points: NDArray, failed: NDArray, kernel: str) -> Posterior:
+    """Return the process g of which an experiment fails with probability Phi(g) (Rasmussen and Williams 2006, ch. 3).
+
+    Where its mean is m and its deviation s, the probability of failure is Phi(m / sqrt(1 + s^2)), eq. 3.82. Far from
+    all data it is a half.
+
+    Parameters
+    ----------
+    points : ndarray (n, d)
+        In the unit cube.
+    failed : ndarray of bool (n,)
+    kernel : str
+    """
+    loss = _Loss(points, failed, kernel)
+    d = points.shape[1]
+    start = np.concatenate([[np.log(_START_VARIANCE)], np.full(d, 0.5 * np.log(d))])
+    best = descend(loss, [start], kernel_bounds(d), iterations=40)
+    posterior, _, _ = loss.infer(best)
+    hyper = Hyperparameters(kernel, 0.0, float(np.exp(best[0])), 0.0, np.exp(best[1:]))
+    # The inverse is symmetric to rounding only, and its factor must exist.
+    inverse = 0.5 * (posterior.woodbury_inv + posterior.woodbury_inv.T)  # pyright: ignore[reportAttributeAccessIssue]
+    values, vectors = np.linalg.eigh(inverse)
+    root = (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    alpha = np.array(posterior.woodbury_vector)[:, :1]  # pyright: ignore[reportAttributeAccessIssue]
+    return Posterior(hyper, points.copy(), alpha, root)
