@@ -9,7 +9,10 @@ from ..rod import Rod
 
 
 class Output(Protocol):
-    """What a sensor sees of the tip: a frozen dataclass whose fields are plain numbers."""
+    """What a sensor sees of the tip: a frozen dataclass whose fields are plain numbers.
+
+    One whose values are not metres says so by an attribute ``unit``, a text.
+    """
 
     @property
     def size(self) -> int:
@@ -135,6 +138,11 @@ class Camera:
     @property
     def size(self) -> int:
         return 2
+
+    @property
+    def unit(self) -> str:
+        """Of the measured values."""
+        return "px"
 
     def check(self, rod: Rod) -> None:
         pass

@@ -20,8 +20,9 @@ class Plant(Protocol):
     A sample goes: ``step(tension)`` holds the tension for one ``sample_time`` and returns what is measured then.
     A plant may have ``prepare()``, called once before the first experiment of a run: what it raises is no result of an
     experiment and ends the run. A plant may know more: ``true_output`` (outputs,), without which experiments report
-    errors by what was measured; ``shape(n)`` (n, 3) m, without which they hold no shapes; and ``disturbance`` (d,),
-    what is measured now of the disturbances that an MPC is to be told.
+    errors by what was measured; ``shape(n)`` (n, 3) m, without which they hold no shapes; ``disturbance`` (d,), what is
+    measured now of the disturbances that an MPC is to be told; and ``output_unit`` and ``input_unit``, texts, without
+    which headings say m and N.
     """
 
     @property

@@ -76,6 +76,11 @@ class SimulatedPlant:
         return self.output.size
 
     @property
+    def output_unit(self) -> str:
+        """Unit of the measured values."""
+        return getattr(self.output, "unit", "m")
+
+    @property
     def tension(self) -> np.ndarray:
         """The inputs held now (inputs,), N unless the rod's cables and chambers take something else."""
         return self._tension.copy()
