@@ -4,8 +4,10 @@ from ._accept import FLOAT_SHARE, check_single_precision
 from ._build import build_and_replay
 from ._errors import ExportError, NotBuiltError
 from ._figures import RANDOM_SAMPLES, core_for
+from ._kind import SOLVERS
 from ._record import ControllerRecord
-from ._write import SOLVERS, export
+from ._sources import data_header, export_sources
+from ._write import export
 from .microcontroller import Core, Emulated, EmulatorError, Firmware, Footprint, build, toolchain
 
 __all__ = [
@@ -24,6 +26,8 @@ __all__ = [
     "build_and_replay",
     "check_single_precision",
     "core_for",
+    "data_header",
     "export",
+    "export_sources",
     "toolchain",
 ]
