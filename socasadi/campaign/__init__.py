@@ -1,39 +1,96 @@
 """Experiments and the search over them: tasks, cost, episodes, the journal, and the study that ties them together."""
 
 from ._assess import Assessment, Verdict, assess
+from ._bench import Bench
 from ._emulate import ProcessorInTheLoop, emulate
-from ._result import Result, RunError
+from ._result import Result
 from ._study import Study
-from .execution import Progress, clock, print_progress, progress_line
-from .experiment import Circle, Cost, Episode, Origin, Pulse, Score, Task, fly, interruptible, probe
-from .store import Flight, ForeignTypeError, Journal, JournalError, Trial
+from ._table import trials_csv
+from .execution import (
+    Campaign,
+    DaskExecutor,
+    Processes,
+    Progress,
+    clock,
+    dask_executor,
+    load_study,
+    print_progress,
+    progress_line,
+)
+from .experiment import (
+    Circle,
+    ClosedLoopStability,
+    Condition,
+    Cost,
+    Episode,
+    IterationBound,
+    Limit,
+    MeasuredLimit,
+    Origin,
+    Overshoot,
+    Pulse,
+    RecordingError,
+    Score,
+    SettlingTime,
+    Task,
+    Units,
+    ViolatedOutputs,
+    fly,
+    interruptible,
+    probe,
+    read_recording,
+    recognise,
+    write_recording,
+)
+from .store import Asked, Flight, ForeignTypeError, Journal, JournalError, RunError, Trial
 
 __all__ = [
+    "Asked",
     "Assessment",
+    "Bench",
+    "Campaign",
     "Circle",
+    "ClosedLoopStability",
+    "Condition",
     "Cost",
+    "DaskExecutor",
     "Episode",
     "Flight",
     "ForeignTypeError",
+    "IterationBound",
     "Journal",
     "JournalError",
+    "Limit",
+    "MeasuredLimit",
     "Origin",
+    "Overshoot",
+    "Processes",
     "ProcessorInTheLoop",
     "Progress",
     "Pulse",
+    "RecordingError",
     "Result",
     "RunError",
     "Score",
+    "SettlingTime",
     "Study",
     "Task",
     "Trial",
+    "Units",
     "Verdict",
+    "ViolatedOutputs",
     "assess",
     "clock",
+    "dask_executor",
     "emulate",
     "fly",
     "interruptible",
+    "load_study",
     "print_progress",
     "probe",
     "progress_line",
+    "read_recording",
+    "recognise",
+    "trials_csv",
+    "write_recording",
 ]

@@ -8,10 +8,11 @@ import numpy as np
 
 from ..model import identify, prediction_error
 from ..mpc import DesignError
-from ._campaign import fly_once
-from ._result import Result, journal_path
+from ..plant import ExternalPlant
+from ._result import Result
+from .execution import fly_once
 from .experiment import Episode, probe
-from .store import Flight, Journal
+from .store import Flight, Journal, journal_path
 
 # Streams of random numbers beside the trials' own, which is 0.
 _VERIFICATION, _PROBE = 1, 2
@@ -47,7 +48,8 @@ class Assessment:
     Attributes
     ----------
     verdicts
-        By name: ``"best"``, the rivals, ``"identified"``.
+        By name: ``"best"``, the best observed; ``"best estimated"``, that of the search, when it is another; the
+        rivals; ``"identified"``.
     unidentified
         Why there is no identified theta; None when there is one.
     """
@@ -59,7 +61,10 @@ class Assessment:
 def assess(
     result: Result, rivals: Mapping[str, np.ndarray] | None = None, notify: Callable[[str], None] = lambda _: None
 ) -> Assessment:
-    """Fly the best theta, ``rivals`` and an identified theta under the same fresh noise, and compare them as models.
+    """Fly the best thetas, ``rivals`` and an identified theta under the same fresh noise, and compare them as models.
+
+    The best observed theta owes a part of its J to the noise of its trial, so the best that the search estimates is
+    flown beside it; what is exported is the better of the two here (:attr:`Result.chosen`).
 
     Experiments: two probing records (one to identify from, one to judge all on) and ``study.verifications`` flights of
     each theta. They are stored in the journal as they happen, so that none is flown twice.
@@ -75,11 +80,22 @@ def assess(
     -------
     Assessment
         Without verdicts when the study asks for no verifications.
+
+    Raises
+    ------
+    ExternalPlantError
+        The robot cannot be flown from here.
     """
     study = result.study
     if study.verifications == 0:
         return Assessment({}, "the study asks for no verifications")
-    thetas, judged, unidentified = {"best": result.best.theta, **(rivals or {})}, None, None
+    if isinstance(study.plant, ExternalPlant):
+        study.plant.prepare()  # refuses: what cannot be flown is no failure of a theta
+    thetas, judged, unidentified = {"best": result.best.theta}, None, None
+    estimate = result.best_estimated
+    if estimate is not None and not np.array_equal(estimate.theta, result.best.theta):
+        thetas["best estimated"] = estimate.theta
+    thetas |= rivals or {}
     with Journal(journal_path(result.folder), writer=True) as journal:
         try:
             if study.mpc.measured_disturbances:

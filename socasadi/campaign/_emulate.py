@@ -8,8 +8,9 @@ import numpy as np
 
 from ..export import RANDOM_SAMPLES, Emulated, EmulatorError, Footprint, build, core_for, export, toolchain
 from ..mpc import Real, check_real
-from ._result import Result, RunError
+from ._result import Result
 from .experiment import Episode, fly
+from .store import RunError
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,7 @@ def emulate(result: Result, *, real: Real = "float") -> ProcessorInTheLoop:
     if reason := toolchain():
         raise EmulatorError(reason)
     study, core = result.study, core_for(real)
-    theta, mpc = result.best.theta, replace(study.mpc, backend="active-set")
+    theta, mpc = result.chosen.theta, replace(study.mpc, backend="active-set")
     settings = {"seed": study.seed, "time_limit": max(study.time_limit, 600.0)}
     record = result.controller_record()
     with tempfile.TemporaryDirectory() as folder:

@@ -1,44 +1,20 @@
 import functools
 import hashlib
-import json
-import textwrap
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..export import ControllerRecord, export
+from ..tune import Estimate
+from ._provenance import provenance
+from .execution import best_trial, kept_limits, replayed
 from .experiment import Episode
-from .store import Flight, Journal, JournalError, Trial, describe
+from .store import Asked, Flight, Journal, RunError, Trial, journal_path, read_settings
 
 if TYPE_CHECKING:
     from ._study import Study
-
-
-class RunError(RuntimeError):
-    """A run folder that cannot be used as asked."""
-
-
-def journal_path(folder: Path) -> Path:
-    """Where a run folder keeps its journal."""
-    return folder / "journal.sqlite"
-
-
-def read_settings(folder: Path) -> dict:
-    """Settings of the study that ``folder`` holds; RunError when it holds none."""
-    path = folder / "study.json"
-    try:
-        return json.loads(path.read_text())["settings"]
-    except FileNotFoundError:
-        raise RunError(f"{folder} is no run folder: it has no study.json") from None
-    except (ValueError, KeyError, TypeError) as error:
-        raise RunError(f"{path} is damaged ({error!r}); restore it from a copy") from error
-
-
-def best_trial(trials: list[Trial]) -> Trial | None:
-    """The trial of least J, the first of equals; None while all have failed."""
-    return min((trial for trial in trials if trial.J is not None), key=lambda trial: trial.J or 0.0, default=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,20 +52,62 @@ class Result:
 
     @functools.cached_property
     def trials(self) -> list[Trial]:
-        """All trials so far, in order."""
+        """All trials that were told so far, in the order of telling."""
         with self._journal() as journal:
             return journal.trials()
 
     @property
+    def pending(self) -> list[Asked]:
+        """Trials that were asked and not told, in the order of asking."""
+        with self._journal() as journal:
+            return journal.pending()
+
+    @property
     def best(self) -> Trial:
-        """The trial of least J; RunError when none succeeded."""
-        best = best_trial(self.trials)
+        """The best observed: of least J among those that kept all limits; RunError when none did."""
+        best = best_trial(self.trials, self.study)
         if best is None:
-            reasons = "; ".join(sorted({trial.failure or "" for trial in self.trials})[:3])
+            reasons = "; ".join(sorted({trial.failure or "a limit was not kept" for trial in self.trials})[:3])
             raise RunError(
                 f"none of the {len(self.trials)} trials in {self.folder} succeeded: {reasons or 'none was made'}"
             )
         return best
+
+    @functools.cached_property
+    def best_estimated(self) -> Estimate | None:
+        """The trial whose J without noise the search estimates lowest, with an interval; None before it can.
+
+        Its ``index`` is a place in :attr:`trials`.
+        """
+        return replayed(self.study.optimizer(), self.trials).best_estimated
+
+    @property
+    def chosen(self) -> Trial:
+        """The trial whose controller is exported.
+
+        Of those that :func:`assess` flew again it is the one of least mean J (one that failed there comes last), since
+        the best observed owes a part of its J to the noise; while the best has not been flown again it is the best.
+        """
+        best = self.best
+        costs: dict[tuple[float, ...], list[float]] = {}
+        for flight in self.flights().values():
+            if flight.theta is not None:
+                J = np.inf if flight.score is None else flight.score.J
+                costs.setdefault(tuple(flight.theta.tolist()), []).append(J)
+        if tuple(best.theta.tolist()) not in costs:
+            return best
+        flown = [trial for trial in kept_limits(self.trials, self.study) if tuple(trial.theta.tolist()) in costs]
+        return min(flown, key=lambda trial: np.mean(costs[tuple(trial.theta.tolist())]))
+
+    @property
+    def plant_seconds(self) -> float:
+        """The robot's time that the trials took, s."""
+        return sum(trial.plant_seconds or 0.0 for trial in self.trials)
+
+    @property
+    def saved_seconds(self) -> float:
+        """The robot's time that was not spent, because hopeless trials were cut, s."""
+        return sum(trial.saved_seconds or 0.0 for trial in self.trials)
 
     @property
     def complete(self) -> bool:
@@ -98,14 +116,16 @@ class Result:
 
     def episode(self, number: int) -> Episode:
         """Record of trial ``number``; RunError when there is none."""
+        if (episode := self._episode(number)) is None:
+            raise RunError(f"trial {number} has no record: its controller could not be made, or J was told alone")
+        return episode
+
+    def _episode(self, number: int) -> Episode | None:
         with self._journal() as journal:
             try:
-                episode = journal.episode(number)
+                return journal.episode(number)
             except KeyError:
                 raise RunError(f"{self.folder} has no trial {number}; it has {len(self.trials)}") from None
-        if episode is None:
-            raise RunError(f"trial {number} has no record: its controller could not be made")
-        return episode
 
     def flights(self) -> dict[str, Flight]:
         """Flights beside the search, by name (see :func:`assess`)."""
@@ -115,52 +135,38 @@ class Result:
     def export(
         self, folder: str | Path, *, real: str = "double", solver: str = "active-set", name: str = "controller"
     ) -> Path:
-        """Write the best trial's controller as C, with its episode to replay; see :func:`socasadi.export.export`."""
+        """Write the :attr:`chosen` controller as C, with its episode to replay; see :func:`socasadi.export.export`."""
         return export(self.controller_record(), folder, real=real, solver=solver, name=name)
 
     def controller_record(self) -> ControllerRecord:
-        """The best trial's controller with its episode, as :func:`socasadi.export.export` takes it."""
-        best, mpc = self.best, self.study.mpc
-        episode = self.episode(best.number)
+        """The :attr:`chosen` trial's controller with its episode, as :func:`socasadi.export.export` takes it.
+
+        Where J was told alone, the controller is simulated on its own model instead.
+        """
+        best, mpc = self.chosen, self.study.mpc
+        system = mpc.model.state_space(best.theta, mpc.sample_time)
+        if (episode := self._episode(best.number)) is None:
+            return replace(ControllerRecord.simulated(mpc, system), provenance=self._provenance(best))
         samples = len(episode.tension)
         ahead = np.arange(1, mpc.reference_rows + 1)
         preview = [self.study.task.reference((t + ahead) * mpc.sample_time) for t in range(samples)]
-        entries = zip(mpc.model.entries, best.theta, strict=True)
-        digest = hashlib.sha256(journal_path(self.folder).read_bytes()).hexdigest()
         return ControllerRecord(
             mpc=mpc,
-            system=mpc.model.state_space(best.theta, mpc.sample_time),
+            system=system,
             output=episode.output[:samples],
             preview=np.array(preview),
             held=episode.held,
             disturbance=episode.disturbance if mpc.measured_disturbances else None,
-            provenance=(
-                f"trial {best.number} of {len(self.trials)}, J = {best.J!r}",
-                f"prediction model {type(mpc.model).__name__}, theta:",
-                *[
-                    f"    {entry.name} = {float(value)!r} {entry.unit.removesuffix('1')}".rstrip()
-                    for entry, value in entries
-                ],
-                *_told("MPC", mpc),
-                *_told("task", self.study.task),
-                *_told("cost", self.study.cost),
-                f"search {self.study.search}, seed {self.study.seed}",
-                f"sha256 of the journal {digest}",
-            ),
+            provenance=self._provenance(best),
+        )
+
+    def _provenance(self, trial: Trial) -> tuple[str, ...]:
+        digest = hashlib.sha256(journal_path(self.folder).read_bytes()).hexdigest()
+        return (
+            f"trial {trial.number} of {len(self.trials)}, J = {trial.J!r}",
+            *provenance(self.study, trial.theta),
+            f"sha256 of the journal {digest}",
         )
 
     def _journal(self) -> Journal:
-        path = journal_path(self.folder)
-        if not path.exists():
-            raise JournalError(
-                f"{self.folder} has no journal.sqlite: restore it from a copy, or start anew in another folder"
-            )
-        return Journal(path)
-
-
-def _told(title: str, part: object) -> list[str]:
-    """Every setting of a part of a study but its model, in lines of a header."""
-    settings = {name: value for name, value in describe(part).items() if name != "model"}
-    kind = settings.pop("type").rpartition(".")[2]
-    told = ", ".join(f"{name} = {json.dumps(value)}" for name, value in settings.items())
-    return textwrap.wrap(f"{title} {kind}: {told}", 110, subsequent_indent="    ", break_long_words=False)
+        return Journal(journal_path(self.folder))

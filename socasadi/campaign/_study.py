@@ -1,19 +1,19 @@
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
-from numbers import Integral
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..mpc import LinearMPC, weight_matrix
-from ..plant import Plant
+from ..plant import ExternalPlant, Plant
 from ..tune import Optimizer, Search, SobolSearch, Space
-from ._absent import AbsentPlant
-from ._campaign import run_campaign
 from ._result import Result
-from .execution import Progress, print_progress
-from .experiment import Cost, Task
+from .execution import Progress, print_progress, run_campaign
+from .experiment import Condition, Cost, Limit, Task, admissible, check_conditions, check_limits
 from .store import ForeignTypeError, describe, rebuild
 
 _MEMBERS = ("sample_time", "inputs", "outputs", "tension", "reset", "step")
@@ -47,6 +47,16 @@ class Study:
         what it is worth without the luck of its trial. 0 spares a real robot these experiments.
     time_limit
         s of wall time after which a trial has failed.
+    initial
+        Thetas that are tried first, such as a datasheet's, an identified one, or the best of an earlier run. They count
+        among the seed points.
+    limits
+        What an episode must keep beside a low J, measured on it; the search learns where they are kept.
+    conditions
+        What a theta must fulfil before any experiment, computed from its controller.
+    give_up
+        An episode is cut as soon as its record proves that its J is above so many times the best J known when it was
+        asked; None flies all to their ends.
 
     Raises
     ------
@@ -64,6 +74,10 @@ class Study:
     search: SearchName = "bayesian"
     verifications: int = 5
     time_limit: float = 60.0
+    initial: Sequence[ArrayLike] = ()
+    limits: tuple[Limit, ...] = ()
+    conditions: tuple[Condition, ...] = ()
+    give_up: float | None = 3.0
 
     def __post_init__(self) -> None:
         kinds = {"plant": Plant, "mpc": LinearMPC, "task": Task, "cost": Cost}
@@ -101,7 +115,22 @@ class Study:
         self.task.samples(mpc.sample_time)
         weight_matrix(self.cost.Q, mpc.outputs, "Q of the cost")
         weight_matrix(self.cost.R, mpc.inputs, "R of the cost")
-        Space(mpc.model.entries)
+        self._check_search()
+
+    def _check_search(self) -> None:
+        space = Space(self.mpc.model.entries)
+        if len(self.initial) and self.search != "bayesian":
+            raise ValueError(f"the search {self.search!r} has points of its own to start with: give no initial ones")
+        if self.search == "paper" and (self.limits or self.conditions):
+            raise ValueError("the search of the paper knows neither limits nor conditions: take another, or give none")
+        # Tuples of numbers, so that studies can be compared whatever a theta was kept in.
+        object.__setattr__(self, "initial", tuple(tuple(space.check(theta).tolist()) for theta in self.initial))
+        for name, check in (("limits", check_limits), ("conditions", check_conditions)):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+            check(getattr(self, name), self.mpc)
+        share = self.give_up
+        if share is not None and not (isinstance(share, Real) and share >= 1):
+            raise ValueError(f"give_up is a number of at least 1, or None, not {share!r}")
 
     @property
     def trials(self) -> int:
@@ -125,23 +154,32 @@ class Study:
             plant = rebuild(settings["plant"])
         except ForeignTypeError:
             mpc = parts["mpc"]
-            plant = AbsentPlant(settings["plant"]["type"], mpc.sample_time, mpc.inputs, mpc.outputs)
+            plant = ExternalPlant(mpc.sample_time, mpc.inputs, mpc.outputs, name=settings["plant"]["type"])
         return cls(plant=plant, **parts)
 
     def optimizer(self) -> Search:
         """A fresh search, before any trial."""
         space = Space(self.mpc.model.entries)
+        limits = {limit.name: limit.limit for limit in self.limits}
+        fulfilled = admissible(self.conditions, self.mpc)
         match self.search:
             case "bayesian":
-                return Optimizer(space, seed=self.seed, seed_points=self.seed_points)
+                return Optimizer(
+                    space,
+                    seed=self.seed,
+                    seed_points=self.seed_points,
+                    initial=self.initial,
+                    limits=limits,
+                    admissible=fulfilled,
+                )
             case "paper":
                 return Optimizer.paper(space, self.seed, seed_points=self.seed_points)
             case "sobol":
-                return SobolSearch(space, self.seed)
+                return SobolSearch(space, self.seed, limits=limits, admissible=fulfilled)
 
     def sobol_only(self) -> "Study":
         """The baseline: as many trials, all at points of the Sobol sequence."""
-        return replace(self, search="sobol")
+        return replace(self, search="sobol", initial=())
 
     def run(
         self,
@@ -149,8 +187,14 @@ class Study:
         *,
         resume: bool = False,
         progress: Callable[[Progress], None] | None = print_progress,
+        jobs: int | None = None,
+        executor: Executor | None = None,
+        script: str | Path | None = None,
     ) -> Result:
         """Run all trials, each stored in ``folder`` before the next is asked.
+
+        Trials that a run asked and could not finish are flown first, with their own theta and noise. Those that were
+        asked by hand (:meth:`Campaign.ask`) stay with whoever asked them.
 
         Parameters
         ----------
@@ -160,13 +204,25 @@ class Study:
             Go on with the run that ``folder`` holds, if it holds one. The same points are asked as without a stop.
         progress
             Called after each trial; None for silence.
+        jobs
+            How many trials at once; more than one are flown by as many processes, or by ``executor``. By default one,
+            or as many as ``executor.jobs`` says.
+        executor
+            Anything with the interface of :mod:`concurrent.futures` that flies trials, such as
+            :func:`dask_executor`'s; it is left open. It is sent text and answers by text.
+        script
+            The file that defines this study, which other processes run again when the settings alone do not make it
+            (a robot of one's own, for instance); the script that Python was started with by default.
 
         Raises
         ------
         RunError
             ``folder`` is there (without ``resume``), or holds a run with other settings; the message names them.
-            ``iterations`` and ``verifications`` may differ.
+            ``iterations`` and ``verifications`` may differ. Or other processes cannot make this study.
         JournalError
             Its journal is damaged, or another process is writing it.
         """
-        return run_campaign(self, Path(folder), resume=resume, progress=progress)
+        script = None if script is None else Path(script)
+        where = {"jobs": jobs, "executor": executor, "script": script}
+        run_campaign(self, Path(folder), resume=resume, progress=progress, **where)
+        return Result(self, Path(folder))

@@ -7,7 +7,7 @@ import casadi as ca
 import pytest
 
 from socasadi import Circle, Cost, LinearMPC, Modal, SimulatedPlant, Study
-from socasadi.campaign import ForeignTypeError
+from socasadi.plant import ExternalPlantError
 from socasadi.rod import BSpline, Cable, Helix, Payload, Rod, Strain, Taper
 
 ROD = Rod.preset("paper")
@@ -40,7 +40,7 @@ def test_a_route_of_ones_own_is_told_from_others_and_cannot_be_flown_from_the_fo
     assert settings == wavy(0.01)
     assert settings != wavy(0.015)
     assert settings != stored(replace(ROD, cables=(Cable(lambda s: (0.01 * ca.sin(s), 0.0)), *ROD.cables[1:])))
-    with pytest.raises(ForeignTypeError, match="SimulatedPlant can only be made by the study script"):
+    with pytest.raises(ExternalPlantError, match="SimulatedPlant cannot be flown from here"):
         Study.from_settings(settings).plant.reset()
 
 

@@ -1,5 +1,28 @@
 """Trials one after another or side by side, each stored before the next is asked."""
 
+from ._campaign import Campaign
+from ._dask import DaskExecutor, dask_executor
+from ._flight import fly_once
+from ._loop import run_campaign
+from ._outcome import best_trial, kept_limits, replayed
+from ._processes import Processes
 from ._progress import Clock, Progress, clock, print_progress, progress_line
+from ._script import load_study
 
-__all__ = ["Clock", "Progress", "clock", "print_progress", "progress_line"]
+__all__ = [
+    "Campaign",
+    "Clock",
+    "DaskExecutor",
+    "Processes",
+    "Progress",
+    "best_trial",
+    "clock",
+    "dask_executor",
+    "fly_once",
+    "kept_limits",
+    "load_study",
+    "print_progress",
+    "progress_line",
+    "replayed",
+    "run_campaign",
+]

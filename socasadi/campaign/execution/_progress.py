@@ -6,14 +6,14 @@ from ..store import Trial
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run stands after a trial.
+    """Where a run stands after a trial was told.
 
     Attributes
     ----------
     trial, best
-        The trial just stored, and the best so far (None while all have failed).
+        The trial just stored, and the best so far (None while none succeeded).
     done, total
-        Numbers of trials.
+        Numbers of trials, told and in all; side by side they are not told in the order of their numbers.
     elapsed, remaining
         s of wall time in this session, and to the end at the pace of the last trials.
     """
@@ -50,17 +50,27 @@ def progress_line(progress: Progress, *, short: bool = False) -> str:
     trial, best = progress.trial, progress.best
     times = clock(progress.elapsed), clock(progress.remaining)
     if short:
-        outcome = "failed" if trial.J is None else f"J {trial.J:.4g}"
+        outcome = _outcome(trial, ".4g")
         incumbent = "no success yet" if best is None else f"best {best.J:.4g} (trial {best.number})"
         return f"{outcome:12} {incumbent:24} {times[0]} + {times[1]} left"
     width = len(str(progress.total))
-    outcome = f"J {trial.J:12.5g}" if trial.J is not None else f"{'failed':>14}"
+    outcome = f"{_outcome(trial, '12.5g'):>14}"
     incumbent = f"best {best.J:10.5g} (trial {best.number})" if best is not None else "no success yet"
-    reason = f"  {trial.failure}" if trial.failure else ""
+    reason = f"  {trial.failure}" if trial.outcome == "failed" else ""
     return (
         f"trial {trial.number:{width}}/{progress.total}  {outcome}  {incumbent}  "
         f"{times[0]} elapsed, {times[1]} left{reason}"
     )
+
+
+def _outcome(trial: Trial, digits: str) -> str:
+    match trial.outcome:
+        case "done":
+            return f"J {trial.J:{digits}}"
+        case "cut":
+            return f"cut, J > {trial.at_least:.4g}"
+        case "failed":
+            return "failed"
 
 
 def clock(seconds: float) -> str:

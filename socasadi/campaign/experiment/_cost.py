@@ -1,3 +1,4 @@
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,25 +58,65 @@ class Cost:
 
     def score(self, episode: Episode, input_scale: np.ndarray) -> Score:
         """Score of a finished episode; ``input_scale`` (m,) N is u_max."""
-        error = episode.output[1:] - episode.reference[1:]
-        Q = weight_matrix(self.Q, error.shape[1], "Q of the cost")
-        R = weight_matrix(self.R, episode.tension.shape[1], "R of the cost")
-        scaled = episode.tension / input_scale
-        changes = np.diff(scaled, axis=0, prepend=episode.held[None] / input_scale)
-        weighed = {"rate": changes, "normalised": scaled, "literal": episode.tension}
-        tracking = _quadratic(error, Q)
-        effort = _quadratic(weighed[self.input_term], R)
+        meter = self.meter(episode.held, episode.output.shape[1], input_scale)
+        for row in _samples(episode):
+            meter.add(*row)
         # A task that ends within 5 s has no settled part and is judged whole.
         settled = episode.time > 5.0 if episode.time[-1] > 5.0 else episode.time > 0
         distance = np.linalg.norm((episode.truth - episode.reference)[settled], axis=1)
         return Score(
-            J=tracking + effort,
-            tracking=tracking,
-            effort=effort,
-            literal=tracking + _quadratic(episode.tension, R),
+            J=meter.J,
+            tracking=meter.tracking,
+            effort=meter.effort,
+            literal=meter.literal,
             rmse=float(np.sqrt(np.mean(distance**2))),
         )
 
+    def running(self, episode: Episode, input_scale: np.ndarray) -> np.ndarray:
+        """The cost that each sample of an episode, whole or not, has proven (T,): it never falls, and ends at J."""
+        meter = self.meter(episode.held, episode.output.shape[1], input_scale)
+        return np.array([meter.add(*row) for row in _samples(episode)])
 
-def _quadratic(rows: np.ndarray, weight: np.ndarray) -> float:
-    return float(np.einsum("ti,ij,tj->", rows, weight, rows))
+    def meter(self, held: np.ndarray, outputs: int, input_scale: np.ndarray) -> "Meter":
+        """A meter at zero, for an episode that starts under the tensions ``held`` (m,) N."""
+        return Meter(self, held, outputs, input_scale)
+
+
+class Meter:
+    """Adds up the cost of an episode, sample by sample.
+
+    Since no term is negative, what it shows is a lower bound of the whole episode's J at any time, in exact arithmetic
+    and in this one: it is J once all samples are in.
+    """
+
+    def __init__(self, cost: Cost, held: np.ndarray, outputs: int, input_scale: np.ndarray) -> None:
+        self._Q = weight_matrix(cost.Q, outputs, "Q of the cost")
+        self._R = weight_matrix(cost.R, len(held), "R of the cost")
+        self._term, self._scale, self._before = cost.input_term, input_scale, held / input_scale
+        self.tracking = self.effort = self.literal = 0.0
+
+    @property
+    def J(self) -> float:
+        """Cost so far."""
+        return self.tracking + self.effort
+
+    def add(self, output: np.ndarray, reference: np.ndarray, tension: np.ndarray) -> float:
+        """Count a sample: what was measured and wanted at its end, and the tensions held during it; J so far."""
+        scaled = tension / self._scale
+        weighed = {"rate": scaled - self._before, "normalised": scaled, "literal": tension}[self._term]
+        self._before = scaled
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is for the caller to judge
+            error = _quadratic(output - reference, self._Q)
+            self.tracking += error
+            self.effort += _quadratic(weighed, self._R)
+            self.literal += error + _quadratic(tension, self._R)
+        return self.J
+
+
+def _samples(episode: Episode) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    return zip(episode.output[1:], episode.reference[1:], episode.tension, strict=True)
+
+
+def _quadratic(row: np.ndarray, weight: np.ndarray) -> float:
+    # A semidefinite weight may give rounding below zero.
+    return max(float(row.dot(weight).dot(row)), 0.0)

@@ -2,7 +2,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,9 @@ from ...mpc import ControllerInfo, LinearMPC
 from ...plant import Plant
 from ._interrupt import check_interrupt
 from ._task import Task
+
+if TYPE_CHECKING:
+    from ._cost import Cost, Meter
 
 _SHAPE_POINTS = 15
 _SHAPE_EVERY = 5
@@ -53,6 +56,9 @@ class Episode:
         Samples in which the controller could not apply its QP's answer.
     failure
         Why the episode ended early, None when it did not.
+    cut
+        Of an episode that was ended because it was hopeless, what its samples prove that J would have been at least;
+        None of any other.
     seconds
         Wall time spent in the ``"plant"`` and in the ``"controller"``.
     """
@@ -67,6 +73,7 @@ class Episode:
     disturbance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     fallbacks: int = 0
     failure: str | None = None
+    cut: float | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -80,12 +87,40 @@ class Episode:
         return Record(self.sample_time, self.tension, self.output)
 
 
-def fly(plant: Plant, controller: Pilot, task: Task, *, seed: int, time_limit: float) -> Episode:
+def fly(
+    plant: Plant,
+    controller: Pilot,
+    task: Task,
+    *,
+    seed: int,
+    time_limit: float,
+    give_up: float | None = None,
+    cost: "Cost | None" = None,
+) -> Episode:
     """Run ``controller`` against ``plant`` along the task's reference.
 
     What the plant raises ends the episode and is its ``failure``, as is more than ``time_limit`` s of wall time; the
     samples until then are kept.
+
+    Parameters
+    ----------
+    seed
+        Of the plant's noise.
+    time_limit
+        s.
+    give_up
+        Value of J from which on the episode is of no interest: once its samples prove that J will be more, it is
+        ``cut``. None: it is flown to its end.
+    cost
+        The J that is meant.
+
+    Raises
+    ------
+    ValueError
+        ``give_up`` without ``cost``.
     """
+    if give_up is not None and cost is None:
+        raise ValueError(f"give_up={give_up} is a value of J: give the cost that it is of")
     mpc = controller.mpc
     samples, preview = task.samples(mpc.sample_time), np.arange(1, mpc.reference_rows + 1)
     flight = _Flight(plant, mpc.sample_time, task)
@@ -94,6 +129,8 @@ def fly(plant: Plant, controller: Pilot, task: Task, *, seed: int, time_limit: f
         with flight.timing("plant"):
             y = measured(plant, plant.reset(task.start, seed=seed, tension_bounds=mpc.input_bounds))
         flight.begin(y)
+        if give_up is not None and cost is not None:
+            flight.meter = cost.meter(flight.held, plant.outputs, mpc.input_scale)
         controller.reset(plant.tension)
         for t in range(samples):
             check_interrupt()
@@ -106,7 +143,10 @@ def fly(plant: Plant, controller: Pilot, task: Task, *, seed: int, time_limit: f
             force = {} if task.pulse is None else {"tip_force": task.pulse.at(t * mpc.sample_time)}
             with flight.timing("plant"):
                 y = measured(plant, plant.step(u, **force))
-            flight.note(u, y, known)
+            spent = flight.note(u, y, known)
+            # What is not finite is for the next step to refuse, and nothing is saved by cutting a finished episode.
+            if give_up is not None and give_up < spent < np.inf and t + 1 < samples:
+                return flight.end(controller.info.fallbacks, cut=spent)
     except Exception as error:  # whatever a plant raises is a result of the experiment
         check_interrupt()
         return flight.end(controller.info.fallbacks, failure=f"{type(error).__name__}: {error}")
@@ -128,13 +168,15 @@ class _Flight:
     """Collects an episode while it happens."""
 
     def __init__(self, plant: Plant, sample_time: float, task: Task) -> None:
-        self.plant, self.sample_time, self.task = plant, sample_time, task
+        self.plant, self.sample_time = plant, sample_time
+        self.reference = task.reference(sample_time * np.arange(task.samples(sample_time) + 1))
         self.output: list[np.ndarray] = []
         self.truth: list[np.ndarray] = []
         self.tension: list[np.ndarray] = []
         self.shapes: list[np.ndarray] = []
         self.disturbance: list[np.ndarray] = []
         self.held = np.zeros(plant.inputs)
+        self.meter: Meter | None = None
         self.seconds = {"plant": 0.0, "controller": 0.0}
 
     @contextmanager
@@ -149,10 +191,14 @@ class _Flight:
         self.held = np.array(self.plant.tension, dtype=float)
         self._see(y)
 
-    def note(self, u: np.ndarray, y: np.ndarray, disturbance: np.ndarray | None) -> None:
+    def note(self, u: np.ndarray, y: np.ndarray, disturbance: np.ndarray | None) -> float:
+        """Keep a sample; the cost so far, 0 where nobody asked."""
         self.tension.append(u)
         self.disturbance.append(np.zeros(0) if disturbance is None else disturbance)
         self._see(y)
+        if self.meter is None:
+            return 0.0
+        return self.meter.add(y, self.reference[len(self.tension)], u)
 
     def _see(self, y: np.ndarray) -> None:
         if len(self.output) % _SHAPE_EVERY == 0 and (shape := getattr(self.plant, "shape", None)):
@@ -160,13 +206,12 @@ class _Flight:
         self.truth.append(np.array(getattr(self.plant, "true_output", y), dtype=float))
         self.output.append(y)
 
-    def end(self, fallbacks: int, failure: str | None = None) -> Episode:
+    def end(self, fallbacks: int, failure: str | None = None, cut: float | None = None) -> Episode:
         p, m = self.plant.outputs, self.plant.inputs
-        instants = self.sample_time * np.arange(len(self.output))
         return Episode(
             sample_time=self.sample_time,
             output=np.reshape(self.output, (-1, p)),
-            reference=self.task.reference(instants).reshape(-1, p),
+            reference=self.reference[: len(self.output)],
             truth=np.reshape(self.truth, (-1, p)),
             tension=np.reshape(self.tension, (-1, m)),
             held=self.held,
@@ -174,5 +219,6 @@ class _Flight:
             disturbance=np.reshape(self.disturbance, (len(self.tension), -1)) if self.tension else np.zeros((0, 0)),
             fallbacks=fallbacks,
             failure=failure,
+            cut=cut,
             seconds=self.seconds,
         )

@@ -27,6 +27,7 @@ def interruptible() -> Iterator[None]:
     signal.signal(signal.SIGINT, _note)
     try:
         yield
+        check_interrupt()  # one that was lost where no experiment followed
     except Exception as error:
         if _heard.is_set():  # a conversion that was broken off may fail in its own way
             raise KeyboardInterrupt from error

@@ -1,138 +1,105 @@
 import contextlib
 import fcntl
-import io
-import json
 import os
 import sqlite3
 import zlib
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 from zipfile import BadZipFile
 
-import numpy as np
+from ..experiment import Episode
+from ._folder import settle
+from ._row import (
+    FLIGHT_COLUMNS,
+    SCHEMA,
+    TABLES,
+    TRIAL_COLUMNS,
+    flight_of,
+    flight_row,
+    record_of,
+    trial_of,
+    trial_row,
+)
+from ._trial import Asked, Flight, Trial
 
-from ..experiment import Episode, Score
-
-SCHEMA = 1
-
-_TABLES = """
-CREATE TABLE about (schema INTEGER NOT NULL);
-CREATE TABLE trial (
-    number INTEGER PRIMARY KEY,
-    phase TEXT NOT NULL,
-    theta TEXT NOT NULL,
-    J REAL,
-    score TEXT,
-    failure TEXT,
-    started TEXT NOT NULL,
-    seconds TEXT NOT NULL,
-    episode BLOB
-);
-CREATE TABLE flight (
-    name TEXT PRIMARY KEY,
-    theta TEXT,
-    J REAL,
-    score TEXT,
-    failure TEXT,
-    episode BLOB NOT NULL
-);
-"""
+# What reading damaged bytes raises, from the database down to an array in a record.
+_DAMAGE = (
+    *(sqlite3.DatabaseError, ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError),
+    *(OverflowError, MemoryError, NotImplementedError, zlib.error, BadZipFile),
+)
 
 
 class JournalError(RuntimeError):
-    """A journal that cannot be read, or that another process is writing."""
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """One trial as the journal has it.
-
-    Attributes
-    ----------
-    number
-        From 1, in the order of asking.
-    phase
-        ``"seed"`` or ``"search"``.
-    theta
-        (size,).
-    score
-        None when it failed.
-    failure
-        Why it failed, None when it did not.
-    started
-        UTC, ISO 8601.
-    seconds
-        Wall time of the whole ``trial``, and of its parts: ``fit`` and ``acquisition`` of the search, ``design`` of the
-        controller, ``plant`` and ``controller`` during the episode.
-    """
-
-    number: int
-    phase: str
-    theta: np.ndarray
-    score: Score | None
-    failure: str | None
-    started: str
-    seconds: dict[str, float]
-
-    @property
-    def J(self) -> float | None:
-        """Cost; None when it failed."""
-        return None if self.score is None else self.score.J
-
-
-@dataclass(frozen=True, eq=False)
-class Flight:
-    """An experiment beside the search: a probing record, or a check of a controller under fresh noise."""
-
-    name: str
-    theta: np.ndarray | None
-    score: Score | None
-    episode: Episode
+    """A journal that cannot be read or written, or that another process is writing."""
 
 
 class Journal:
-    """Everything that was measured in a run, in one SQLite file; each trial is one transaction.
+    """Everything that was asked and measured in a run, in one SQLite file; each ask and each tell is one transaction.
+
+    The file takes every transaction at once, so that it is whole without SQLite's file of changes beside it.
 
     Parameters
     ----------
     path
-        The file; made when ``writer`` and not there.
+        The file.
     writer
         Whether trials will be added. One process at a time can be the writer of a journal.
+    create
+        Make the file, unless it is there.
 
     Raises
     ------
     JournalError
-        Another process writes it; it is damaged; it is no journal, or one of another version.
+        Another process writes it; it is damaged; it is no journal, or one of another version; it cannot be made.
     """
 
-    def __init__(self, path: Path, *, writer: bool = False) -> None:
+    def __init__(self, path: Path, *, writer: bool = False, create: bool = False) -> None:
         self.path = path
         self._lock = _lock(path) if writer else None
-        if not writer and not path.exists():
-            raise JournalError(f"there is no journal at {path}")
-        # A process that is killed at once may leave an empty file behind.
-        fresh = not path.exists() or path.stat().st_size == 0
-        with self._reading():
-            self._database = sqlite3.connect(
-                f"{path.resolve().as_uri()}?mode={'rwc' if writer else _read_mode(path)}", uri=True
-            )
-            if fresh:
-                self._database.executescript(
-                    f"PRAGMA journal_mode=WAL; BEGIN; {_TABLES} INSERT INTO about VALUES ({SCHEMA}); COMMIT;"
+        try:
+            self._database = self._open(writer, create)
+        except BaseException:
+            self._unlock()
+            raise
+
+    def _open(self, writer: bool, create: bool) -> sqlite3.Connection:
+        if not self.path.exists():
+            if not create:
+                raise JournalError(
+                    f"{self.path.parent} has no {self.path.name}: restore it from a copy, or start anew in another "
+                    "folder"
                 )
-            self._database.execute("PRAGMA synchronous=FULL")
-            (state,) = self._database.execute("PRAGMA quick_check").fetchone()
-            if state != "ok":
-                raise sqlite3.DatabaseError(state.splitlines()[0])
-            (schema,) = self._database.execute("SELECT schema FROM about").fetchone()
-        if schema != SCHEMA:
-            raise JournalError(f"{path} has schema version {schema}, this socasadi reads version {SCHEMA}")
+            try:
+                _make(self.path)
+            except (sqlite3.Error, OSError) as error:
+                raise self._unwritable(error) from error
+        with self._reading():
+            mode = "rw" if writer else _read_mode(self.path)
+            database = sqlite3.connect(f"{self.path.resolve().as_uri()}?mode={mode}", uri=True)
+            try:
+                database.execute("PRAGMA synchronous=FULL")
+                database.execute("PRAGMA wal_autocheckpoint=1")
+                (state,) = database.execute("PRAGMA quick_check").fetchone()
+                if state != "ok":
+                    raise sqlite3.DatabaseError(state.splitlines()[0])
+                (schema,) = database.execute("SELECT schema FROM about").fetchone()
+                if schema != SCHEMA:
+                    raise JournalError(
+                        f"{self.path} has schema version {schema}, this socasadi reads version {SCHEMA}: read it with "
+                        "the socasadi that wrote it (study.json says which), or start anew in another folder"
+                    )
+            except BaseException:
+                database.close()
+                raise
+        return database
 
     def close(self) -> None:
         """Close the file and let others write it."""
         self._database.close()
+        self._unlock()
+
+    def _unlock(self) -> None:
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
@@ -143,44 +110,32 @@ class Journal:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def add_trial(self, trial: Trial, episode: Episode | None) -> None:
-        """Store a trial; on return it is on the disk."""
-        row = (
-            trial.number,
-            trial.phase,
-            json.dumps(trial.theta.tolist()),
-            trial.J,
-            _score_text(trial.score),
-            trial.failure,
-            trial.started,
-            json.dumps(trial.seconds),
-            None if episode is None else _pack(episode),
-        )
+    def add_asked(self, asked: Asked) -> None:
+        """Store a trial that will be handed out; on return it is on the disk."""
+        self._insert("trial", trial_row(asked))
+
+    def add_told(self, trial: Trial, episode: Episode | None) -> None:
+        """Store the outcome of a trial that was asked, and its record."""
+        row = trial_row(trial, episode)
         with self._writing():
-            self._database.execute("INSERT INTO trial VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
+            self._database.execute(
+                f"UPDATE trial SET {', '.join(f'{name} = :{name}' for name in row)} WHERE number = :number", row
+            )
 
     def add_flight(self, flight: Flight) -> None:
         """Store a flight beside the search."""
-        theta = None if flight.theta is None else json.dumps(flight.theta.tolist())
-        J = None if flight.score is None else flight.score.J
-        row = (flight.name, theta, J, _score_text(flight.score), flight.episode.failure, _pack(flight.episode))
-        with self._writing():
-            self._database.execute("INSERT INTO flight VALUES (?, ?, ?, ?, ?, ?)", row)
+        self._insert("flight", flight_row(flight))
 
     def trials(self) -> list[Trial]:
-        """All trials in their order, without their episodes."""
-        query = "SELECT number, phase, theta, score, failure, started, seconds FROM trial ORDER BY number"
-        with self._reading():
-            trials = [
-                Trial(number, phase, np.array(json.loads(theta)), _score(score), failure, started, json.loads(seconds))
-                for number, phase, theta, score, failure, started, seconds in self._database.execute(query)
-            ]
-            if [trial.number for trial in trials] != list(range(1, len(trials) + 1)):
-                raise ValueError("trials are missing from their row")
-        return trials
+        """All trials that were told, in the order of telling, without their records."""
+        return sorted((row for row in self._rows() if isinstance(row, Trial)), key=lambda trial: trial.told)
+
+    def pending(self) -> list[Asked]:
+        """All trials that were asked and not told, in the order of asking."""
+        return [row for row in self._rows() if not isinstance(row, Trial)]
 
     def episode(self, number: int) -> Episode | None:
-        """Record of one trial; None when its controller could not even be made.
+        """Record of one trial; None when it has none, because its controller could not be made or J was told alone.
 
         Raises
         ------
@@ -188,8 +143,9 @@ class Journal:
             There is no such trial.
         """
         with self._reading():
-            row = self._database.execute("SELECT episode FROM trial WHERE number = ?", (number,)).fetchone()
-            episode = None if row is None or row[0] is None else _unpack(row[0])
+            query = "SELECT episode, record_checksum FROM trial WHERE number = ?"
+            row = self._database.execute(query, (number,)).fetchone()
+            episode = None if row is None or row == (None, None) else record_of(*row)
         if row is None:
             raise KeyError(f"{self.path} has no trial {number}")
         return episode
@@ -197,19 +153,35 @@ class Journal:
     def flights(self) -> dict[str, Flight]:
         """All flights beside the search, by name."""
         with self._reading():
-            rows = self._database.execute("SELECT name, theta, score, episode FROM flight").fetchall()
-            return {
-                name: Flight(name, None if theta is None else np.array(json.loads(theta)), _score(score), _unpack(blob))
-                for name, theta, score, blob in rows
-            }
+            query = f"SELECT {', '.join(FLIGHT_COLUMNS)} FROM flight ORDER BY rowid"
+            flights = [flight_of(values) for values in self._database.execute(query)]
+        return {flight.name: flight for flight in flights}
+
+    def _rows(self) -> list[Asked]:
+        """All trials in the order of asking: a :class:`Trial` for those that were told."""
+        with self._reading():
+            query = f"SELECT {', '.join(TRIAL_COLUMNS)} FROM trial ORDER BY number"
+            rows = [trial_of(values) for values in self._database.execute(query)]
+            events = [row.asked for row in rows]
+            in_order = events == sorted(events) and [row.number for row in rows] == list(range(1, len(rows) + 1))
+            events += [row.told for row in rows if isinstance(row, Trial)]
+            if not in_order or sorted(events) != list(range(1, len(events) + 1)):
+                raise ValueError("trials are missing from their row")
+        return rows
+
+    def _insert(self, table: str, row: Mapping[str, Any]) -> None:
+        with self._writing():
+            self._database.execute(
+                f"INSERT INTO {table} ({', '.join(row)}) VALUES ({', '.join(f':{name}' for name in row)})", row
+            )
 
     @contextlib.contextmanager
     def _reading(self) -> Iterator[None]:
         try:
             yield
-        except (sqlite3.DatabaseError, ValueError, TypeError, KeyError, EOFError, zlib.error, BadZipFile) as error:
+        except _DAMAGE as error:
             raise JournalError(
-                f"{self.path} is damaged or no journal of socasadi ({error}); "
+                f"{self.path} is damaged or no journal of socasadi ({' '.join(str(error).split())}); "
                 "restore it from a copy, or start anew in another folder"
             ) from error
 
@@ -219,7 +191,25 @@ class Journal:
             with self._database:
                 yield
         except sqlite3.Error as error:
-            raise JournalError(f"{self.path} cannot be written ({error}); what was stored before is safe") from error
+            raise self._unwritable(error) from error
+
+    def _unwritable(self, error: Exception) -> JournalError:
+        return JournalError(
+            f"{self.path} cannot be written ({error}); what was stored before is safe: mend that, and resume"
+        )
+
+
+def _make(path: Path) -> None:
+    """An empty journal, which comes into its place whole: a file that is cut short was never a journal."""
+    scratch = path.with_name(f"{path.name}.new")
+    for left in path.parent.glob(f"{scratch.name}*"):
+        left.unlink()
+    database = sqlite3.connect(scratch)
+    try:
+        database.executescript(f"PRAGMA journal_mode=WAL; BEGIN; {TABLES} INSERT INTO about VALUES ({SCHEMA}); COMMIT;")
+    finally:
+        database.close()
+    settle(scratch, path)
 
 
 def _read_mode(path: Path) -> str:
@@ -236,31 +226,8 @@ def _lock(path: Path) -> int:
         holder = os.read(handle, 32).decode(errors="replace").strip() or "unknown"
         os.close(handle)
         raise JournalError(f"{path.parent} is being written by process {holder}; wait for it, or stop it") from None
-    os.ftruncate(handle, 0)
-    os.write(handle, str(os.getpid()).encode())
+    # On a full disk the name is missing, not the lock.
+    with contextlib.suppress(OSError):
+        os.ftruncate(handle, 0)
+        os.write(handle, str(os.getpid()).encode())
     return handle
-
-
-def _score_text(score: Score | None) -> str | None:
-    return None if score is None else json.dumps(asdict(score))
-
-
-def _score(text: str | None) -> Score | None:
-    return None if text is None else Score(**json.loads(text))
-
-
-_ARRAYS = ("output", "reference", "truth", "tension", "held", "shapes", "disturbance")
-
-
-def _pack(episode: Episode) -> bytes:
-    about = json.dumps([episode.sample_time, episode.fallbacks, episode.failure, episode.seconds])
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, about=np.array(about), **{name: getattr(episode, name) for name in _ARRAYS})
-    return buffer.getvalue()
-
-
-def _unpack(blob: bytes) -> Episode:
-    with np.load(io.BytesIO(blob), allow_pickle=False) as data:
-        sample_time, fallbacks, failure, seconds = json.loads(data["about"].item())
-        arrays = {name: data[name] for name in _ARRAYS if name in data}
-    return Episode(sample_time, **arrays, fallbacks=fallbacks, failure=failure, seconds=seconds)

@@ -1,0 +1,39 @@
+"""A study from the Python file that defines it."""
+
+import runpy
+import sys
+import traceback
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..store import RunError
+
+if TYPE_CHECKING:
+    from .._study import Study
+
+
+def load_study(script: Path) -> "Study":
+    """The ``study`` that ``script`` defines.
+
+    Raises
+    ------
+    RunError
+        There is no such file, it breaks off (the message says where), or it defines no study.
+    """
+    from .._study import Study
+
+    if not script.is_file():
+        raise RunError(f"there is no study script {script}")
+    # As when Python runs it: the script may import what lies beside it.
+    sys.path.insert(0, str(script.parent))
+    try:
+        study = runpy.run_path(str(script), run_name="__study__").get("study")
+    except SyntaxError as error:
+        raise RunError(f"{error.filename}, line {error.lineno}: {error.msg}") from error
+    except Exception as error:
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(script)]
+        place = f"{script}, line {lines[-1]}" if lines else str(script)
+        raise RunError(f"{place}: {type(error).__name__}: {error}") from error
+    if not isinstance(study, Study):
+        raise RunError(f"{script} defines no `study`: let it make one, study = Study(plant=..., mpc=..., task=...)")
+    return study

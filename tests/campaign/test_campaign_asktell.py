@@ -1,0 +1,240 @@
+"""Asking and telling from outside: an experiment by hand takes the place of a flown one, days apart."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from socasadi import Circle, Study
+from socasadi.campaign import Campaign, Journal, JournalError, Overshoot, Result, RunError, assess, fly
+from socasadi.plant import ExternalPlant, ExternalPlantError
+
+
+def flown(study, asked):
+    """What a person brings back: the robot's record of a trial."""
+    seed = int(np.random.SeedSequence([study.seed, 0, asked.number]).generate_state(1)[0])
+    controller = study.mpc.controller(asked.theta)
+    settings = {"seed": seed, "time_limit": 60.0, "give_up": asked.give_up, "cost": study.cost}
+    return fly(study.plant, controller, study.task, **settings)
+
+
+def test_asked_and_told_one_by_one_from_reopened_folders_it_is_the_run_that_flies_itself(toy_study, tmp_path):
+    study = replace(toy_study, task=Circle(duration=1.0, period=2.0), iterations=3)
+    run = study.run(tmp_path / "run", progress=None)
+    for number in range(1, 10):
+        with Campaign(study, tmp_path / "hand", resume=True) as campaign:
+            asked = campaign.ask()
+        with Campaign.open(tmp_path / "hand") as campaign:
+            assert [out.number for out in campaign.pending] == [asked.number] == [number]
+            campaign.tell(number, episode=flown(study, asked))
+    by_hand = Result.open(tmp_path / "hand")
+    assert by_hand.complete
+    for ours, theirs in zip(by_hand.trials, run.trials, strict=True):
+        assert ours.theta.tolist() == theirs.theta.tolist()
+        assert (ours.J, ours.at_least, ours.outcome, ours.score) == (
+            theirs.J,
+            theirs.at_least,
+            theirs.outcome,
+            theirs.score,
+        )
+    assert by_hand.plant_seconds == run.plant_seconds
+    assert by_hand.episode(2).output.tolist() == run.episode(2).output.tolist()
+
+
+def test_what_is_out_is_reckoned_with_and_comes_back_the_same(toy_study, tmp_path):
+    with Campaign(toy_study, tmp_path / "run") as campaign:
+        asked = [campaign.ask() for _ in range(3)]
+        campaign.tell(2, cost=5.0)
+    assert len({tuple(one.theta) for one in asked}) == 3
+    with Campaign(toy_study, tmp_path / "run", resume=True) as campaign:
+        assert [out.number for out in campaign.pending] == [1, 3]
+        for out, before in zip(campaign.pending, (asked[0], asked[2]), strict=True):
+            assert out.theta.tolist() == before.theta.tolist()
+            assert (out.give_up, out.asked, out.started) == (before.give_up, before.asked, before.started)
+        assert campaign.ask().number == 4
+
+
+def test_an_ask_is_stored_before_it_is_handed_out(toy_study, tmp_path):
+    """Another program can read it from the journal at once."""
+    with Campaign(toy_study, tmp_path / "run") as campaign:
+        theta = campaign.ask().theta
+        code = (
+            "import json, sqlite3, sys; "
+            "print(*sqlite3.connect(sys.argv[1]).execute('SELECT theta FROM trial').fetchone())"
+        )
+        command = [sys.executable, "-c", code, str(tmp_path / "run" / "journal.sqlite")]
+        seen = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert seen.strip() == str(theta.tolist())
+
+
+class TestOutcomes:
+    @pytest.fixture
+    def campaign(self, toy_study, tmp_path):
+        with Campaign(toy_study, tmp_path / "run") as campaign:
+            campaign.ask()
+            yield campaign
+
+    def test_a_cost_from_elsewhere(self, campaign):
+        trial = campaign.tell(1, cost=7)
+        assert (trial.outcome, trial.J, trial.score, trial.plant_seconds) == ("done", 7.0, None, None)
+        assert campaign.best is trial
+
+    def test_a_failure_with_its_reason(self, campaign):
+        trial = campaign.tell(1, failed="the cable slipped")
+        assert (trial.outcome, trial.J, trial.failure) == ("failed", None, "the cable slipped")
+        assert campaign.best is None
+
+    def test_a_record_that_ends_in_a_failure(self, campaign, toy_study):
+        episode = flown(toy_study, campaign.pending[0])
+        broken = replace(episode, output=episode.output[:6], tension=episode.tension[:5], failure="a hose burst")
+        trial = campaign.tell(1, episode=broken)
+        assert (trial.outcome, trial.failure) == ("failed", "a hose burst")
+        assert trial.plant_seconds == pytest.approx(0.25)
+
+    def test_a_record_that_was_cut_is_a_bound(self, campaign, toy_study):
+        episode = flown(toy_study, campaign.pending[0])
+        trial = campaign.tell(1, episode=replace(episode, tension=episode.tension[:5], cut=12.5))
+        assert (trial.outcome, trial.J, trial.at_least) == ("cut", None, 12.5)
+        assert trial.plant_seconds == pytest.approx(0.25)
+        assert trial.saved_seconds == pytest.approx(0.75)
+        assert trial.failure == "J is above 12.5 after 0.25 s"
+
+    @pytest.mark.parametrize(
+        ("number", "told", "words"),
+        [
+            (2, {"cost": 1.0}, "trial 2 of .* was never asked; not told yet: 1"),
+            (1, {}, "trial 1 is told by exactly one of an episode, a cost and a reason"),
+            (1, {"cost": 1.0, "failed": "no"}, "exactly one of"),
+            (1, {"cost": float("nan")}, "the cost is nan: it must be finite"),
+            (1, {"cost": -1.0}, "the cost -1.0 is negative"),
+        ],
+    )
+    def test_what_cannot_be_told_is_refused_and_nothing_is_stored(self, campaign, number, told, words):
+        with pytest.raises((RunError, ValueError), match=words):
+            campaign.tell(number, **told)
+        assert [asked.number for asked in campaign.pending] == [1]
+        with Journal(campaign.folder / "journal.sqlite") as journal:
+            assert not journal.trials()
+        assert campaign.tell(1, cost=1.0).J == 1.0
+
+    def test_a_trial_is_told_once(self, campaign):
+        campaign.tell(1, cost=1.0)
+        with pytest.raises(RunError, match=r"trial 1 of .* was told already; not told yet: none"):
+            campaign.tell(1, cost=1.0)
+
+
+def test_when_all_are_asked_no_more_are(toy_study, tmp_path):
+    with Campaign(replace(toy_study, seed_points=2, iterations=0), tmp_path / "run") as campaign:
+        campaign.ask()
+        campaign.ask()
+        with pytest.raises(
+            RunError, match=r"all 2 trials of .* were asked, 2 of them are out; ask for more iterations"
+        ):
+            campaign.ask()
+
+
+def test_a_limit_must_be_measured(toy_study, tmp_path):
+    study = replace(toy_study, limits=(Overshoot(0.5),))
+    with Campaign(study, tmp_path / "run") as campaign:
+        asked = campaign.ask()
+        with pytest.raises(RunError, match="cannot be told by its cost alone, since the study limits overshoot"):
+            campaign.tell(1, cost=4.0)
+        trial = campaign.tell(1, cost=4.0, measured={"overshoot": 0.7})
+        assert trial.measured == {"overshoot": 0.7}
+        assert campaign.best is None
+        asked = campaign.ask()
+        assert asked.give_up is None
+        assert campaign.tell(2, episode=flown(study, asked)).measured["overshoot"] < 0.5
+        assert campaign.best.number == 2
+
+
+def test_trials_that_broke_a_limit_are_never_the_best(toy_study, tmp_path):
+    free = toy_study.run(tmp_path / "free", progress=None)
+    with Journal(tmp_path / "free" / "journal.sqlite") as journal:
+        least = Overshoot(1.0).measure(journal.episode(free.best.number), toy_study.mpc)
+    study = replace(toy_study, limits=(Overshoot(0.9 * least),))
+    bound = study.run(tmp_path / "bound", progress=None)
+    assert min(trial.J for trial in free.trials if trial.J) == free.best.J
+    kept = [trial for trial in bound.trials if trial.J and trial.measured["overshoot"] <= 0.9 * least]
+    assert len(kept) < len([trial for trial in bound.trials if trial.J])
+    if kept:
+        assert min(trial.J for trial in kept) == bound.best.J
+    else:
+        with pytest.raises(RunError, match="a limit was not kept"):
+            _ = bound.best
+
+
+class TestAbsentRobot:
+    @pytest.fixture
+    def study(self, toy_study):
+        plant = ExternalPlant(sample_time=0.05, inputs=3, outputs=2, name="the arm")
+        return Study(plant=plant, mpc=toy_study.mpc, task=Circle(duration=1.0), seed_points=3, iterations=0)
+
+    def test_a_robot_that_python_never_touches_has_a_campaign(self, study, tmp_path):
+        with Campaign(study, tmp_path / "run") as campaign:
+            for cost in (3.0, 1.0, 2.0):
+                campaign.tell(campaign.ask().number, cost=cost)
+            assert campaign.complete
+        result = Result.open(tmp_path / "run")
+        assert result.best.J == 1.0
+        with pytest.raises(ExternalPlantError, match="the arm cannot be flown from here"):
+            assess(result)
+        assert not result.flights()
+
+    def test_but_no_run(self, study, tmp_path):
+        with pytest.raises(ExternalPlantError, match="the arm cannot be flown from here"):
+            study.run(tmp_path / "run", jobs=2)
+        assert not (tmp_path / "run").exists()
+
+
+def test_while_somebody_asks_nobody_else_can(toy_study, tmp_path):
+    with (
+        Campaign(toy_study, tmp_path / "run"),
+        pytest.raises(JournalError, match=f"is being written by process {os.getpid()}"),
+    ):
+        Campaign(toy_study, tmp_path / "run", resume=True)
+
+
+class TestStartPoints:
+    def test_they_are_asked_first_and_count_among_the_seed_points(self, toy_study, tmp_path):
+        theta = [(entry.lower + entry.upper) / 2 for entry in toy_study.mpc.model.entries]
+        study = replace(toy_study, initial=[np.array(theta)], seed_points=3, iterations=0)
+        result = study.run(tmp_path / "run", progress=None)
+        assert result.trials[0].theta.tolist() == theta
+        assert len(result.trials) == 3
+        assert study == Study(**vars(study))
+        assert study.sobol_only().run(tmp_path / "sobol", progress=None).trials[0].theta.tolist() != theta
+
+    @pytest.mark.parametrize(
+        ("changes", "words"),
+        [
+            ({"initial": [[1.0]]}, r"theta has shape \(1,\)"),
+            ({"initial": [[100.0] * 10]}, "outside its bounds"),
+            ({"initial": [[3.0] * 10], "search": "sobol"}, "has points of its own to start with"),
+            ({"search": "paper", "limits": (Overshoot(0.1),)}, "knows neither limits nor conditions"),
+            ({"give_up": 0.5}, "give_up is a number of at least 1, or None, not 0.5"),
+            ({"limits": (Overshoot(0.1), Overshoot(0.2))}, "overshoot"),
+        ],
+    )
+    def test_settings_of_the_search_are_checked(self, toy_study, changes, words):
+        with pytest.raises(ValueError, match=words):
+            replace(toy_study, **changes)
+
+
+def test_cutting_saves_the_robots_time_and_changes_no_J(toy_study, tmp_path):
+    whole = replace(toy_study, give_up=None, iterations=0).run(tmp_path / "whole", progress=None)
+    cut = replace(toy_study, iterations=0).run(tmp_path / "cut", progress=None)
+    assert whole.saved_seconds == 0
+    assert whole.plant_seconds == pytest.approx(6 * 1.0)
+    assert cut.saved_seconds > 0
+    assert cut.plant_seconds + cut.saved_seconds == pytest.approx(6 * 1.0)
+    best = float("inf")
+    for ours, theirs in zip(cut.trials, whole.trials, strict=True):
+        if ours.outcome == "cut":
+            assert 3 * best == ours.give_up < ours.at_least <= theirs.J
+        else:
+            assert ours.J == theirs.J
+            best = min(best, ours.J)

@@ -1,0 +1,109 @@
+"""What the found theta is worth without the luck of its trial, and which one is exported."""
+
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+
+from socasadi.campaign import Campaign, Flight, Journal, Result, assess
+from socasadi.plant import PlantFailure
+
+
+def test_no_verification_is_flown_twice(toy_study, tmp_path):
+    result = toy_study.run(tmp_path / "run", progress=None)
+    first = assess(result)
+    steps = []
+    original = type(toy_study.plant).step
+    counted = replace(toy_study, plant=toy_study.plant)
+    toy_study.plant.step = lambda *a, **k: (steps.append(1), original(toy_study.plant, *a, **k))[1]
+    second = assess(Result(counted, result.folder))
+    assert not steps
+    np.testing.assert_array_equal(first.verdicts["best"].J, second.verdicts["best"].J)
+
+
+def test_a_plant_that_cannot_be_probed_still_has_its_best_theta_verified(toy_study, tmp_path):
+    class Tired(type(toy_study.plant)):
+        def reset(self, tip=None, *, seed=None, tension_bounds=(-inf, inf)):
+            self.steps = 0
+            return super().reset(tip, seed=seed)
+
+        def step(self, tension, tip_force=None):
+            self.steps += 1
+            if self.steps > 50:
+                raise PlantFailure("the battery is empty")
+            return super().step(tension, tip_force)
+
+    result = replace(toy_study, plant=Tired()).run(tmp_path / "run", progress=None)
+    assessment = assess(result)
+    assert set(assessment.verdicts) <= {"best", "best estimated"}
+    assert np.isnan(assessment.verdicts["best"].prediction_error)
+    assert assessment.unidentified == "PlantFailure: the battery is empty"
+
+
+def test_the_identified_theta_predicts_no_worse_than_the_tuned_one(toy_study, tmp_path):
+    verdicts = assess(toy_study.run(tmp_path / "run", progress=None)).verdicts
+    assert verdicts["identified"].prediction_error <= 1.05 * verdicts["best"].prediction_error
+
+
+def test_the_best_that_is_estimated_is_flown_beside_the_best_observed_and_the_better_is_exported(toy_study, tmp_path):
+    noisy = replace(toy_study, plant=type(toy_study.plant)(noise=0.02), verifications=3)
+    result = noisy.run(tmp_path / "run", progress=None)
+    verdicts = assess(result).verdicts
+    estimate = result.best_estimated
+    assert estimate.low <= estimate.cost <= estimate.high
+    trial = result.trials[estimate.index]
+    assert trial.theta.tolist() == estimate.theta.tolist()
+    rivals = [verdicts[name] for name in ("best", "best estimated") if name in verdicts]
+    assert len(rivals) == 1 + (trial.number != result.best.number)
+    better = min(rivals, key=lambda verdict: verdict.J.mean())
+    assert result.chosen.theta.tolist() == better.theta.tolist()
+    assert any(f"trial {result.chosen.number} of 12" in line for line in result.controller_record().provenance)
+
+
+@pytest.fixture
+def told(toy_study, tmp_path):
+    """A run whose trial 1 was told the least J, and a way to add flights of its trials."""
+    study = replace(toy_study, seed_points=3, iterations=0)
+    episode = study.run(tmp_path / "flown", progress=None).episode(1)
+    with Campaign(study, tmp_path / "run") as campaign:
+        for cost in (1.0, 2.0, 3.0):
+            campaign.tell(campaign.ask().number, cost=cost)
+    result = Result(study, tmp_path / "run")
+    score = study.cost.score(episode, study.mpc.input_scale)
+
+    def fly(number, *costs):
+        with Journal(result.folder / "journal.sqlite", writer=True) as journal:
+            for i, J in enumerate(costs):
+                flight = Flight(f"{number} {i}", result.trials[number - 1].theta, J and replace(score, J=J), episode)
+                journal.add_flight(flight)
+
+    return result, fly
+
+
+@pytest.mark.parametrize(
+    ("flights", "chosen"),
+    [
+        ({}, 1),
+        ({1: (5.0, 5.0)}, 1),
+        ({1: (5.0, 5.0), 2: (4.0, 4.5)}, 2),
+        ({1: (5.0, 5.0), 2: (1.0, None)}, 1),
+        ({1: (5.0, None), 2: (9.0, 9.0)}, 2),
+        ({2: (0.5,)}, 1),
+    ],
+)
+def test_of_those_flown_again_the_one_of_least_mean_J_is_exported(told, flights, chosen):
+    result, fly = told
+    for number, costs in flights.items():
+        fly(number, *costs)
+    assert result.best.number == 1
+    assert result.chosen.number == chosen
+
+
+def test_a_controller_whose_J_was_told_alone_is_exported_with_an_episode_on_its_own_model(told, tmp_path):
+    result, _ = told
+    record = result.controller_record()
+    assert record.provenance[0] == "trial 1 of 3, J = 1.0"
+    assert len(record.output) == 200
+    result.export(tmp_path / "c")
+    assert (tmp_path / "c" / "controller.h").exists()
