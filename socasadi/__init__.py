@@ -28,28 +28,49 @@ name                        symbol       meaning, unit
 ==========================  ===========  =======================================================
 """
 
-from .campaign import Circle, Cost, Origin, Pulse, Result, Study, Task
+from .campaign import (
+    Campaign,
+    Circle,
+    ClosedLoopStability,
+    Cost,
+    IterationBound,
+    Origin,
+    Overshoot,
+    Pulse,
+    Result,
+    SettlingTime,
+    Study,
+    Task,
+    ViolatedOutputs,
+)
 from .model import Dense, Modal
 from .mpc import LinearMPC
-from .plant import Camera, LaserSpot, Plant, SimulatedPlant
+from .plant import Camera, ExternalPlant, LaserSpot, Plant, SimulatedPlant
 from .rod import Rod
 from .tune import Optimizer
 
 __all__ = [
     "Camera",
+    "Campaign",
     "Circle",
+    "ClosedLoopStability",
     "Cost",
     "Dense",
+    "ExternalPlant",
+    "IterationBound",
     "LaserSpot",
     "LinearMPC",
     "Modal",
     "Optimizer",
     "Origin",
+    "Overshoot",
     "Plant",
     "Pulse",
     "Result",
     "Rod",
+    "SettlingTime",
     "SimulatedPlant",
     "Study",
     "Task",
+    "ViolatedOutputs",
 ]

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from socasadi.campaign import Journal
+from socasadi.campaign import Journal, Result
 from socasadi.codegen import c_compiler
 from socasadi.export import toolchain
 
@@ -203,8 +203,8 @@ def test_a_run_folder_that_exists_needs_resume_and_the_same_settings(finished):
 
 
 def test_what_the_readme_shows_of_python_runs(tmp_path):
-    code, rod, mpc = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
-    for block in (rod, mpc):
+    code, rod, mpc, bench = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+    for block in (rod, mpc, bench):
         run = subprocess.run([sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True)
         assert run.returncode == 0, run.stderr
     assert "casadi_real" in (tmp_path / "rhs.c").read_text()
@@ -213,6 +213,33 @@ def test_what_the_readme_shows_of_python_runs(tmp_path):
     run = subprocess.run([sys.executable, "-c", short], cwd=tmp_path, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     assert (tmp_path / "build" / "controller.h").exists()
+
+
+def test_the_best_of_an_earlier_run_is_tried_first_and_processes_share_the_trials(finished, tmp_path):
+    folder, _ = finished
+    earlier = Result.open(folder / "runs" / "study")
+    script = study(tmp_path)
+    run = socasadi("run", script, "--start", folder / "runs" / "study", "--jobs", 2, cwd=tmp_path)
+    assert run.returncode == 0, run.stderr
+    trials = sorted(Result.open(tmp_path / "runs" / "study").trials, key=lambda trial: trial.number)
+    np.testing.assert_array_equal(trials[0].theta, earlier.chosen.theta)
+    assert len(trials) == 6
+
+
+def test_a_start_that_does_not_fit_is_said(finished, tmp_path):
+    folder, _ = finished
+    script = study(tmp_path)
+    script.write_text(script.read_text().replace("length=0.6", "length=6.0"))
+    run = socasadi("run", script, "--start", folder / "runs" / "study", cwd=tmp_path)
+    assert run.returncode == 1
+    assert "cannot be a start: its frequency_y is" in run.stderr
+    assert "outside this study's bounds" in run.stderr
+    script.write_text(
+        "from socasadi import *\nstudy = Study(plant=ExternalPlant(.05, 3, 2), mpc=LinearMPC(Dense()), task=Circle())\n"
+    )
+    run = socasadi("run", script, "--start", folder / "runs" / "study", cwd=tmp_path)
+    assert run.returncode == 1
+    assert "cannot be a start: its theta is frequency_y rad/s" in run.stderr
 
 
 def test_a_run_begun_by_python_goes_on_by_the_command_with_a_robot_of_ones_own(tmp_path):
