@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
-from scipy.stats import qmc
 
 from ._base import PredictionModel, StateSpace
 from ._record import Record
@@ -57,6 +56,8 @@ def identify(
         return np.clip(np.nan_to_num(error, nan=limit, posinf=limit, neginf=-limit), -limit, limit).ravel()
 
     box = (0.0, 1.0) if within_bounds else (-np.inf, np.inf)
+    from scipy.stats import qmc  # half of the time that importing the package would take
+
     points = qmc.Sobol(model.size, rng=np.random.default_rng(seed)).random(128)
     points = points[np.argsort([np.sum(residual(x) ** 2) for x in points])[:starts]]
     fits = [least_squares(residual, np.clip(x, 1e-6, 1 - 1e-6), bounds=box, x_scale=0.1, max_nfev=60) for x in points]

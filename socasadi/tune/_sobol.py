@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import qmc
 
+from ._quasirandom import sobol
 from ._search import Estimate, History, Timings, Trial, check_seed
 from ._space import Space
 
@@ -25,7 +25,7 @@ class SobolPoints:
         self._seen = 0
 
     def _draw(self, log2_count: int) -> NDArray:
-        return qmc.Sobol(self._space.dimension, rng=np.random.default_rng(self._seed)).random_base2(log2_count)
+        return sobol(self._space.dimension, log2_count, np.random.default_rng(self._seed))
 
     def __getitem__(self, index: int) -> NDArray:
         """Theta of that index (d,); ValueError when the conditions leave nothing of the box."""

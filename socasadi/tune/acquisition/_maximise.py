@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.stats import qmc
 
+from .._quasirandom import sobol
 from ._merit import Merit
 
 # Two points closer than this in every coordinate of the unit cube count as one: asking both would teach nothing, and
@@ -50,7 +50,7 @@ def maximise(
         None of a thousand points and more that were tried is admissible.
     """
     dimension = taken.shape[1]
-    spread = qmc.Sobol(dimension, rng=rng).random_base2(_SOBOL_LOG2)
+    spread = sobol(dimension, _SOBOL_LOG2, rng)
     groups = [spread, _around(incumbents, rng)]
     values = [merit(group) for group in groups]
     largest = max(float(np.abs(value).max()) for value in values)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import boxcox, inv_boxcox
-from scipy.stats import boxcox_normmax, norm, rankdata, yeojohnson_normmax
+from scipy.special import boxcox, inv_boxcox, ndtri
 
 from .._named import choose
 
@@ -71,7 +69,7 @@ def _box_cox(power: float | None) -> Fit:
 
     def fit(costs: NDArray) -> Scale:
         unit = float(np.exp(np.log(costs).mean()))
-        p = _most_normal(boxcox_normmax, costs / unit) if power is None else power
+        p = _most_normal("boxcox", costs / unit) if power is None else power
         ends = np.sort(boxcox(np.array([1e-100, 1e100]), p))
 
         def inverse(targets: NDArray) -> NDArray:
@@ -98,7 +96,7 @@ def _yeo_johnson(power: float | None) -> Fit:
         unit = float(high - low)
         if unit <= 1e-9 * np.ptp(costs):
             unit = float(np.ptp(costs)) or 1.0
-        p = _most_normal(yeojohnson_normmax, (costs - centre) / unit) if power is None else power
+        p = _most_normal("yeojohnson", (costs - centre) / unit) if power is None else power
 
         def forward(costs: NDArray) -> NDArray:
             x = (np.asarray(costs, dtype=float) - centre) / unit
@@ -122,12 +120,14 @@ def _yeo_johnson(power: float | None) -> Fit:
     return fit
 
 
-def _most_normal(normmax: Callable[..., Any], costs: NDArray) -> float:
+def _most_normal(family: str, costs: NDArray) -> float:
+    from scipy import stats  # half of the time that importing the package would take
+
     if len(costs) < 3 or np.ptp(costs) < 1e-9 * max(1.0, float(np.abs(costs).max())):
         return 1.0
     with np.errstate(all="ignore"):
         try:
-            power = float(np.squeeze(normmax(costs)))
+            power = float(np.squeeze(getattr(stats, f"{family}_normmax")(costs)))
         except (ValueError, RuntimeError):
             return 1.0
     return float(np.clip(power, *POWERS)) if np.isfinite(power) else 1.0
@@ -150,9 +150,10 @@ def _half_rank(base: Fit) -> Fit:
         spread = float(np.sqrt(np.mean((values[good] - median) ** 2)))
         if spread == 0:
             return inner
-        quantiles = norm.ppf((rankdata(values) - 0.5) / len(values))
-        bad = np.unique(values[~good])
-        ranked = np.array([np.min(quantiles[values == value]) for value in bad])
+        bad, ordered = np.unique(values[~good]), np.sort(values)
+        # Equals share the middle of their ranks.
+        ranks = 0.5 * (np.searchsorted(ordered, bad, "left") + np.searchsorted(ordered, bad, "right"))
+        ranked = ndtri(ranks / len(values))
         knots = np.concatenate([[median], bad])
         heights = np.concatenate([[median], np.minimum(bad, median + spread * ranked)])
         # Ties aside it increases; what is worse than all seen goes on with the last slope, which is above zero.
