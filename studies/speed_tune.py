@@ -149,6 +149,10 @@ def regrets(table: Table, instants: Sequence[int]) -> None:
     print(f"\n{table.problem.title}: regret above {table.least:.6g}, the lowest {known}; median [quartiles]")
     if table.problem.note:
         print(f"({table.problem.note})")
+    if unlike := table.unlike():
+        print(
+            f"NOT COMPARABLE: at the seed points of repetitions {unlike} methods saw other costs; was the study changed?"
+        )
     tested = OURS in table.costs
     columns = "".join(f"{f'after {instant}':>34}" for instant in instants)
     tests = "".join(f"{f'ours at {instant}':>16}" for instant in instants) if tested else ""

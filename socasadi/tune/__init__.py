@@ -7,7 +7,10 @@ Knows nothing of robots. GPy gives the marginal likelihood; prediction and acqui
     for _ in range(110):
         theta = search.ask()
         search.tell(theta, cost(theta))
-    search.best
+    search.best, search.best_estimated
+
+`surrogate` is what is believed of the cost, `acquisition` where to ask next; each of their parts has a name by which an
+`Optimizer` is made of others.
 """
 
 from ._optimizer import Optimizer

@@ -30,6 +30,10 @@ _EXACT = 1e-6
 _SIDE = 1.645  # deviations of a normal distribution between which 90 % lie
 
 
+# By so much the logarithm of another way's evidence has to be above the first's: several ways are tried, and each is
+# fitted to the same costs.
+_PREFERENCE = 6.0
+
 # So many trials, and each multiple of the period after them, get a full fit; between, the descent starts at its result.
 _ALL_FULL = 30
 _PERIOD = 5
@@ -86,7 +90,7 @@ class Believer:
         return data.subset(_active(data.targets, self.active_set, rng))
 
     def _way(self, trials: Sequence[Trial], units: NDArray, ways: int) -> int:
-        """Which way makes the costs most probable: by the evidence of its targets times the slopes."""
+        """Which way makes the costs most probable: by the evidence of its targets times the slopes; if in doubt, 0."""
         if ways == 1:
             return 0
         scores = []
@@ -94,6 +98,7 @@ class Believer:
             data = self._data(trials, units, way)
             data = data.subset(~data.bound)
             scores.append(evidence(data.points, data.targets, self.settings, data.known) + data.log_slopes.sum())
+        scores[0] += _PREFERENCE
         return int(np.argmax(scores))
 
     def belief(self, trials: Sequence[Trial], start: Start | None) -> Belief:

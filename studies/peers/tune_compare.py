@@ -65,6 +65,14 @@ class Table:
         self.least = float(lowest) if problem.least is None else problem.least
         self.costs = {method: done for method, done in self.costs.items() if method in methods}
 
+    def unlike(self) -> list[int]:
+        """Repetitions in which methods, told the same seed points, did not see the same: J was another's then."""
+        seen: dict[int, list[float]] = {}
+        for done in self.costs.values():
+            for repetition, costs in done.items():
+                seen.setdefault(repetition, []).append(float(costs[SEED_POINTS - 1]))
+        return sorted(repetition for repetition, costs in seen.items() if not np.allclose(costs, costs[0], rtol=1e-3))
+
     def regrets(self, method: str) -> np.ndarray:
         """(repetitions, evaluations)."""
         done = self.costs.get(method, {})
