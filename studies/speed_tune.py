@@ -150,9 +150,7 @@ def regrets(table: Table, instants: Sequence[int]) -> None:
     if table.problem.note:
         print(f"({table.problem.note})")
     if unlike := table.unlike():
-        print(
-            f"NOT COMPARABLE: at the seed points of repetitions {unlike} methods saw other costs; was the study changed?"
-        )
+        print(f"NOT COMPARABLE: at the seed points of repetitions {unlike} methods saw unlike costs; rerun what is old")
     tested = OURS in table.costs
     columns = "".join(f"{f'after {instant}':>34}" for instant in instants)
     tests = "".join(f"{f'ours at {instant}':>16}" for instant in instants) if tested else ""

@@ -203,8 +203,9 @@ def test_a_run_folder_that_exists_needs_resume_and_the_same_settings(finished):
 
 
 def test_what_the_readme_shows_of_python_runs(tmp_path):
-    code, rod, mpc, bench = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
-    for block in (rod, mpc, bench):
+    code, *others = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+    assert len(others) == 4
+    for block in others:
         run = subprocess.run([sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True)
         assert run.returncode == 0, run.stderr
     assert "casadi_real" in (tmp_path / "rhs.c").read_text()

@@ -51,8 +51,8 @@ class Optimizer:
     transform : {"power", "power-half-rank", "half-rank", "log", "log-half-rank", "box-cox", "yeo-johnson", "none"}
         What is modelled: J, its logarithm, or a power of it: "power" takes the Yeo-Johnson power, from the linear one
         to the reciprocal (for J > 0 the Box-Cox ones, too), under which the process finds the costs most probable, and
-        J itself if in doubt; "box-cox" and "yeo-johnson" the one that makes them most normal. "half-rank" keeps of the worse half little more than the order. Logarithm and
-        "box-cox" need J > 0.
+        J itself if in doubt; "box-cox" and "yeo-johnson" the one that makes them most normal. "half-rank" keeps of
+        the worse half little more than the order. Logarithm and "box-cox" need J > 0.
     mean : {"constant", "zero"}
         Learned constant, or zero, of the standardised targets.
     priors : bool
