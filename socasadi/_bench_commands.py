@@ -2,7 +2,6 @@
 
 import json
 import shlex
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -41,20 +40,24 @@ def init(
     folder: Annotated[Path | None, typer.Option("--out", help="Run folder; runs/NAME by default.")] = None,
     iterations: Annotated[int | None, typer.Option(help="Trials after the seed points.")] = None,
     seed: Annotated[int | None, typer.Option(help="Of the search.")] = None,
-    real: Annotated[str, typer.Option(help="What the controller's C computes in: double or float.")] = "double",
+    real: Annotated[
+        str | None, typer.Option(help="What the controller's C computes in: double (default) or float.")
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Change the iterations of a run that is there.")] = False,
 ) -> None:
     """Make a run whose trials are flown by hand or by another program: ask and tell bring them."""
-    check_real(real)
-    _check_compiler(real)
+    if real is not None:
+        check_real(real)
+        _check_compiler(real)
     study = load_study(script)
     changes = {"iterations": iterations, "seed": seed}
     study = replace(study, **{name: value for name, value in changes.items() if value is not None})
     folder = folder or Path("runs") / script.stem
     with Campaign(study, folder, resume=resume):
-        bench = Bench(study, folder, real)  # pyright: ignore[reportArgumentType] (checked above)
-        if not resume:
-            bench.prepare()
+        bench = Bench.of(study, folder)
+        if real is not None:
+            bench = bench.computing_in(real)  # pyright: ignore[reportArgumentType] (checked above)
+        bench.prepare()
     try:
         Result.open(folder)
         again = ""
@@ -120,6 +123,9 @@ def tell(
     measured: Annotated[
         list[str] | None, typer.Option(metavar="NAME=VALUE", help="With --cost: a value that the study limits.")
     ] = None,
+    anyway: Annotated[
+        bool, typer.Option("--anyway", help="Take a recording whose inputs are not the controller's.")
+    ] = False,
     script: StudyScript = None,
 ) -> None:
     """Bring the result of a trial that was flown by hand or by another program."""
@@ -135,11 +141,11 @@ def tell(
         if recording is None:
             told = campaign.tell(trial, cost=cost, failed=failed, measured=values or None)
         else:
-            told = campaign.tell(trial, episode=_recorded(campaign, trial, recording))
+            told = campaign.tell(trial, episode=_recorded(campaign, trial, recording, anyway))
         _print_told(campaign, told, before)
 
 
-def _recorded(campaign: Campaign, number: int, path: Path) -> Episode:
+def _recorded(campaign: Campaign, number: int, path: Path, anyway: bool) -> Episode:
     """The episode of a recording, which has to be of that trial."""
     asked = {asked.number: asked for asked in campaign.pending}.get(number)
     if asked is None:  # which the campaign refuses, whatever was recorded
@@ -152,12 +158,11 @@ def _recorded(campaign: Campaign, number: int, path: Path) -> Episode:
             f"{path} holds the inputs of trial {other}'s controller, and not of trial {number}'s: tell it as trial "
             f"{other}, or fly trial {number} with the controller_data.h of its own"
         )
-    if share > _DOUBTFUL:
-        warnings.warn(
-            f"the inputs in {path} are {100 * share:.0f} % of their bound from those of trial {number}'s controller "
-            "(root mean square); if it was not the one that flew, its J says nothing",
-            RuntimeWarning,
-            stacklevel=2,
+    if share > _DOUBTFUL and not anyway:
+        raise RunError(
+            f"trial {number}'s controller would have answered the outputs in {path} by other inputs: they differ by "
+            f"{100 * share:.0f} % of the bound (root mean square), so another one flew, or a column is wrong; what is "
+            "told cannot be taken back, so tell it with --anyway if you are sure"
         )
     return episode
 

@@ -1,7 +1,7 @@
 """What somebody who flies a trial by hand is given: theta, the controller's numbers, and the C that they belong to."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +48,12 @@ class Bench:
             return cls(study, folder, **json.loads(path.read_text()))
         except (ValueError, TypeError) as error:
             raise RunError(f"{path} is damaged ({error}); restore it from a copy") from error
+
+    def computing_in(self, real: Real) -> "Bench":
+        """The same in another precision; RunError when that of the run was chosen already."""
+        if real != self.real and (self.folder / _SETTINGS).exists():
+            raise RunError(f"the controllers of {self.folder} compute in {self.real}: they cannot change to {real}")
+        return replace(self, real=real)
 
     @property
     def sources(self) -> Path:

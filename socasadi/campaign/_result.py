@@ -9,7 +9,7 @@ import numpy as np
 from ..export import ControllerRecord, export
 from ..tune import Estimate
 from ._provenance import provenance
-from .execution import best_trial, kept_limits, replayed
+from .execution import best_trial, keeps_limits, replayed
 from .experiment import Episode
 from .store import Asked, Flight, Journal, RunError, Trial, journal_path, read_settings
 
@@ -96,8 +96,12 @@ class Result:
                 costs.setdefault(tuple(flight.theta.tolist()), []).append(J)
         if tuple(best.theta.tolist()) not in costs:
             return best
-        flown = [trial for trial in kept_limits(self.trials, self.study) if tuple(trial.theta.tolist()) in costs]
+        flown = [trial for trial in self.trials if self.kept(trial) and tuple(trial.theta.tolist()) in costs]
         return min(flown, key=lambda trial: np.mean(costs[tuple(trial.theta.tolist())]))
+
+    def kept(self, trial: Trial) -> bool:
+        """Whether a trial is done and kept all limits of the study."""
+        return keeps_limits(trial, self.study)
 
     @property
     def plant_seconds(self) -> float:
@@ -119,6 +123,10 @@ class Result:
         if (episode := self._episode(number)) is None:
             raise RunError(f"trial {number} has no record: its controller could not be made, or J was told alone")
         return episode
+
+    def recorded(self, number: int) -> bool:
+        """Whether trial ``number`` has a record, which one that was told by its cost alone has not."""
+        return self._episode(number) is not None
 
     def _episode(self, number: int) -> Episode | None:
         with self._journal() as journal:

@@ -56,7 +56,7 @@ class Study:
         What a theta must fulfil before any experiment, computed from its controller.
     give_up
         An episode is cut as soon as its record proves that its J is above so many times the best J known when it was
-        asked; None flies all to their ends.
+        asked; None flies all to their ends, as the paper's search always does.
 
     Raises
     ------
@@ -77,7 +77,7 @@ class Study:
     initial: Sequence[ArrayLike] = ()
     limits: tuple[Limit, ...] = ()
     conditions: tuple[Condition, ...] = ()
-    give_up: float | None = 3.0
+    give_up: float | None = 10.0
 
     def __post_init__(self) -> None:
         kinds = {"plant": Plant, "mpc": LinearMPC, "task": Task, "cost": Cost}

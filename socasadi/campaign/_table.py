@@ -27,26 +27,33 @@ def trials_csv(result: Result) -> str:
     return buffer.getvalue()
 
 
-def _rows(result: Result) -> Iterator[dict[str, Any]]:
+def _rows(result: Result) -> Iterator[dict[Any, Any]]:
     study, unit = result.study, Units.of(result.study.plant).output
+    entries, limits = study.mpc.model.entries, study.limits
+    # What a user names may be called like what is here: keys of another kind keep them apart.
     headings = {
         **{name: name for name in ("trial", "phase", "outcome", "J", "literal")},
         "rmse": f"rmse [{unit}]",
         **{name: name for name in ("at_least", "failure")},
-        **{entry.name: _with_unit(entry.name, entry.unit) for entry in study.mpc.model.entries},
-        **{limit.name: _with_unit(limit.name, limit.unit) for limit in study.limits},
+        **{("entry", entry.name): _with_unit(entry.name, entry.unit) for entry in entries},
+        **{("limit", limit.name): _with_unit(limit.name, limit.unit) for limit in limits},
         **{name: f"{name} [s]" for name in ("seconds", "plant_seconds", "saved_seconds")},
         "asked": "asked",
     }
     yield headings
     for trial in sorted([*result.trials, *result.pending], key=lambda trial: trial.number):
-        theta = zip(study.mpc.model.entries, trial.theta.tolist(), strict=True)
-        row = {"trial": trial.number, "phase": trial.phase, "outcome": "pending", "asked": trial.started}
-        row |= {entry.name: value for entry, value in theta}
+        row: dict[Any, Any] = {
+            "trial": trial.number,
+            "phase": trial.phase,
+            "outcome": "pending",
+            "asked": trial.started,
+        }
+        row |= {("entry", entry.name): value for entry, value in zip(entries, trial.theta.tolist(), strict=True)}
         if isinstance(trial, Trial):
             row |= {name: getattr(trial, name) for name in ("outcome", "J", "at_least", "failure")}
             row |= asdict(trial.score) if trial.score else {}
-            row |= {"seconds": trial.seconds.get("trial")} | (trial.measured or {})
+            row |= {("limit", name): value for name, value in (trial.measured or {}).items()}
+            row["seconds"] = trial.seconds.get("trial")
             row |= {name: getattr(trial, name) for name in ("plant_seconds", "saved_seconds")}
         yield {name: row.get(name) for name in headings}
 

@@ -1,38 +1,55 @@
+from collections.abc import Callable
+
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from ..campaign import Trial
-from ._style import BLACK, BLUE, COLUMN, MM, ORANGE, legend_above, page
+from ._style import BLACK, BLUE, COLUMN, GREY, MM, ORANGE, legend_above, page
 
 # Costs above this multiple of the best are not resolved.
 _HIGHEST = 30
 
 
-def convergence(trials: list[Trial], baseline: list[Trial] | None = None) -> Figure:
-    """Cost of each trial and the best so far; the baseline's best so far beside it."""
+def convergence(trials: list[Trial], kept: Callable[[Trial], bool], baseline: list[Trial] | None = None) -> Figure:
+    """Cost of each trial and the best so far of those that are ``kept``; the baseline's best so far beside it.
+
+    Trials stand in the order in which they were told.
+    """
     figure, (axes,) = page(COLUMN, 62 * MM)
     axes.set_yscale("log")
     known = [trial.J for trial in trials if trial.J is not None]
     ceiling = _HIGHEST * min(known, default=1.0)
-    for phase, label, marker, face in (("seed", "seed point", "s", "white"), ("search", "search", "o", BLUE)):
-        done = [(t.number, t.J) for t in trials if t.phase == phase and t.J is not None and ceiling >= t.J]
-        if done:
-            style = {"mfc": face, "mec": BLUE, "mew": 0.6, "ms": 2.8, "zorder": 2}
-            axes.plot(*np.transpose(done), marker, label=label, **style)
+    told = [(place, trial, trial.at_least if trial.J is None else trial.J) for place, trial in enumerate(trials, 1)]
+    kinds = {
+        "seed point": ("s", "white", BLUE, [(n, J) for n, t, J in told if kept(t) and t.phase == "seed"]),
+        "search": ("o", BLUE, BLUE, [(n, J) for n, t, J in told if kept(t) and t.phase == "search"]),
+        "broke a limit": ("D", "white", ORANGE, [(n, J) for n, t, J in told if t.J is not None and not kept(t)]),
+        "cut: J is above": ("^", "white", GREY, [(n, J) for n, t, J in told if t.at_least is not None]),
+    }
+    for label, (marker, face, edge, points) in kinds.items():
+        seen = [(n, J) for n, J in points if J is not None and ceiling >= J]
+        if seen:
+            axes.plot(*np.transpose(seen), marker, label=label, mfc=face, mec=edge, mew=0.6, ms=2.8, zorder=2)
     # Failures have no cost, and what is far off would squeeze the rest: both stand on the upper edge.
-    beyond = [t.number for t in trials if t.J is not None and ceiling < t.J]
-    failed = [t.number for t in trials if t.J is None]
-    for numbers, label, marker, colour in ((beyond, "off the scale", "^", BLUE), (failed, "failed", "x", ORANGE)):
+    beyond = [n for n, _, J in told if J is not None and ceiling < J]
+    failed = [n for n, _, J in told if J is None]
+    for numbers, label, marker, colour in ((beyond, "off the scale", "2", BLUE), (failed, "failed", "x", ORANGE)):
         if numbers:
             edge = {"transform": axes.get_xaxis_transform(), "clip_on": False, "ls": "", "mew": 0.6}
             axes.plot(numbers, np.ones(len(numbers)), marker=marker, mfc="white", mec=colour, label=label, **edge)
-    incumbent = best_so_far(trials)
+    incumbent = best_so_far(trials, kept)
     axes.step(np.arange(1, len(trials) + 1), incumbent, where="post", color=BLACK, label="best so far", zorder=4)
     if baseline:
         steps = np.arange(1, len(baseline) + 1)
         axes.step(
-            steps, best_so_far(baseline), where="post", color=ORANGE, ls="--", label="best of Sobol points", zorder=3
+            steps,
+            best_so_far(baseline, kept),
+            where="post",
+            color=ORANGE,
+            ls="--",
+            label="best of Sobol points",
+            zorder=3,
         )
     if np.isfinite(incumbent).any():
         best = int(np.nanargmin(incumbent))
@@ -47,8 +64,9 @@ def convergence(trials: list[Trial], baseline: list[Trial] | None = None) -> Fig
             ha="right" if right else "left",
             color=ORANGE,
         )
-    axes.yaxis.set_major_locator(LogLocator(numticks=8))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda J, _: f"{J:g}"))
+    axes.yaxis.set_minor_locator(NullLocator())
     if known:
         axes.set_ylim(min(known) / 1.5, min(1.3 * max(known), ceiling))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -59,8 +77,8 @@ def convergence(trials: list[Trial], baseline: list[Trial] | None = None) -> Fig
     return figure
 
 
-def best_so_far(trials: list[Trial]) -> np.ndarray:
-    """Least cost up to each trial; NaN while all have failed."""
-    costs = np.array([np.inf if trial.J is None else trial.J for trial in trials])
+def best_so_far(trials: list[Trial], kept: Callable[[Trial], bool]) -> np.ndarray:
+    """Least cost of those kept up to each trial; NaN before the first."""
+    costs = np.array([trial.J if kept(trial) else np.inf for trial in trials])
     least = np.minimum.accumulate(costs) if len(costs) else costs
     return np.where(np.isfinite(least), least, np.nan)

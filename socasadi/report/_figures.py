@@ -10,7 +10,7 @@ from ._style import SETTINGS
 
 
 def figures(result: Result, baseline: list[Trial] | None = None, trial: int | None = None) -> dict[str, Figure]:
-    """The figures of a run by name: convergence, responses, path, inputs, shapes.
+    """The figures of a run by name: convergence, responses, path, inputs, shapes; the first alone where no record is.
 
     Parameters
     ----------
@@ -21,9 +21,11 @@ def figures(result: Result, baseline: list[Trial] | None = None, trial: int | No
     """
     mpc = result.study.mpc
     with matplotlib.rc_context(SETTINGS):
+        drawn: dict[str, Figure | None] = {"convergence": convergence(result.trials, result.kept, baseline)}
+        if trial is None and not result.recorded(result.best.number):
+            return {name: figure for name, figure in drawn.items() if figure is not None}
         episode = result.episode(result.best.number if trial is None else trial)
-        drawn = {
-            "convergence": convergence(result.trials, baseline),
+        drawn |= {
             "responses": responses(episode, mpc.output_limits),
             "path": path(episode) if mpc.outputs == 2 else None,
             "inputs": inputs(episode, mpc.input_limits),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ._search import Estimate, Trial
+from ._search import Estimate, Trial, keeps_limits
 from ._space import Space
 from .surrogate import (
     Data,
@@ -81,13 +81,16 @@ class Believer:
         way = self._way(trials, units, ways) if start is None or start.way >= ways else start.way
         rng = np.random.default_rng([self.seed, len(trials), 0])
         hyper = None if start is None else start.hyperparameters
-        data, cost = surrogate(self._data(trials, units, way), self.settings, rng, hyper)
+        data = self._data(trials, units, way)
+        data, cost = surrogate(data, self.settings, rng, hyper, _seen_noise(trials, data))
         return data, cost, Start(way, cost.hyperparameters)
 
     def _data(self, trials: Sequence[Trial], units: NDArray, way: int) -> Data:
         data = cost_data(trials, units, self.transform, way)
+        broken = np.array([not keeps_limits(trials[row], self.limits) for row in data.rows])
         rng = np.random.default_rng([self.seed, len(trials), 3])
-        return data.subset(_active(data.targets, self.active_set, rng))
+        # Trials that may be the best before costs that broke a limit, and those before bounds.
+        return data.subset(_active(np.lexsort((data.targets, broken, data.bound)), self.active_set, rng))
 
     def _way(self, trials: Sequence[Trial], units: NDArray, ways: int) -> int:
         """Which way makes the costs most probable: by the evidence of its targets times the slopes; if in doubt, 0."""
@@ -109,7 +112,7 @@ class Believer:
         failure = None
         if failed.any():
             rng = np.random.default_rng([self.seed, len(trials), 1])
-            rows = _active(np.where(failed, 0.0, 1.0), self.active_set, rng)
+            rows = _active(np.argsort(~failed, kind="stable"), self.active_set, rng)
             failure = classify(units[rows], failed[rows], self.settings.kernel)
         limited = [self._limited(name, trials, units) for name in self.limits]
         return Belief(trials, units, data, cost, found, failure, limited)
@@ -119,7 +122,7 @@ class Believer:
         data = plain_data(rows, [trials[i].measured[name] for i in rows], units, transform_named("yeo-johnson"))
         limit = float(data.standardise(np.array([self.limits[name]]))[0])
         rng = np.random.default_rng([self.seed, len(trials), 2])
-        near = _active(np.abs(data.targets - limit), self.active_set, rng)
+        near = _active(np.argsort(np.abs(data.targets - limit), kind="stable"), self.active_set, rng)
         _, posterior = surrogate(data.subset(near), FitSettings(restarts=1), rng)
         return posterior, limit
 
@@ -155,15 +158,8 @@ class Belief:
     @property
     def noisy(self) -> bool:
         """Whether the cost may have noise: a point told twice with one and the same cost says that it has none."""
-        seen: dict[bytes, float] = {}
-        for trial in self.trials:
-            if trial.cost is None:
-                continue
-            place = trial.theta.tobytes()
-            if place in seen and abs(seen[place] - trial.cost) <= 1e-10 * abs(trial.cost):
-                return False
-            seen[place] = trial.cost
-        return True
+        costs = _repeated(self.trials)
+        return not any(np.ptp(told) <= 1e-10 * np.abs(told).max() for told in costs)
 
     def rows_that(self, keep: Callable[[Trial], bool]) -> NDArray:
         """Indices into the data of the trials with that property."""
@@ -199,10 +195,25 @@ class Belief:
         return condition(self.cost.hyperparameters, known, drawn, _EXACT * self.cost.hyperparameters.variance)
 
 
-def _active(values: NDArray, size: int, rng: np.random.Generator) -> NDArray:
-    """Indices of the data that are used: all, or the lower half of `size` and a random choice of the others."""
-    if len(values) <= size:
-        return np.arange(len(values))
-    order = np.argsort(values, kind="stable")
+def _repeated(trials: Sequence[Trial]) -> list[NDArray]:
+    """The costs of each theta that was told more than one."""
+    costs: dict[bytes, list[float]] = {}
+    for trial in trials:
+        if trial.cost is not None:
+            costs.setdefault(trial.theta.tobytes(), []).append(trial.cost)
+    return [np.array(told) for told in costs.values() if len(told) > 1]
+
+
+def _seen_noise(trials: Sequence[Trial], data: Data) -> float:
+    """Variance of the noise among the targets of thetas that were told more than once; 0 where none was."""
+    groups = [data.standardise(costs) for costs in _repeated(trials)]
+    freedom = sum(len(group) - 1 for group in groups)
+    return sum(float(((group - group.mean()) ** 2).sum()) for group in groups) / freedom if freedom else 0.0
+
+
+def _active(order: NDArray, size: int, rng: np.random.Generator) -> NDArray:
+    """Which data are used: all, or of `size` the first half in that order and a random choice of the others."""
+    if len(order) <= size:
+        return np.arange(len(order))
     half = size - size // 2
     return np.sort(np.concatenate([order[:half], rng.choice(order[half:], size // 2, replace=False)]))

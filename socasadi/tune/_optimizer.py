@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
 from ._belief import Belief, Believer, Start, last_full_fit
-from ._search import Estimate, History, Timings, Trial, check_seed
+from ._search import Estimate, History, Timings, Trial, check_seed, keeps_limits
 from ._sobol import SobolPoints
 from ._space import Space
 from .acquisition import Constraint, Merit, acquisition_named, maximise
@@ -20,6 +20,7 @@ from .surrogate import FitSettings, Posterior, import_gpy, transform_named
 _INCUMBENTS = 5
 _FANTASIES = 8
 _HIDDEN_WORLDS = 16
+_FIRST_REPEAT = 20
 
 
 class Optimizer:
@@ -71,6 +72,8 @@ class Optimizer:
     active_set : int, optional
         Beyond so many trials the process is fitted to this many of them: the better half, and of the rest some at
         random.
+    repeat : bool
+        Ask the best told point again when the noise matters.
 
     Raises
     ------
@@ -81,8 +84,9 @@ class Optimizer:
     -----
     Failed trials teach a Gaussian process of their own where experiments fail, and the acquisition is weighed with the
     probability of success; they never are the best. While there are only failures the Sobol sequence goes on.
-    Trials that were cut count as lower bounds. The best told point is asked again when the model, noise included,
-    expects more of that than of any new point; a cost that came out the same to ten digits is taken for free of noise.
+    Trials that were cut count as lower bounds. The best told point is asked again after 20, 40, 80, ... trials, which
+    shows how much noise there is, and whenever the model expects more of that than of any new point; a cost that came
+    out the same to ten digits is taken for free of noise, and no point is asked again.
     """
 
     def __init__(
@@ -102,6 +106,7 @@ class Optimizer:
         limits: Mapping[str, float] | None = None,
         admissible: Callable[[NDArray], bool] | None = None,
         active_set: int = 300,
+        repeat: bool = True,
     ) -> None:
         self._seed = check_seed(seed)
         self._seed_points = _count("seed_points", seed_points)
@@ -118,6 +123,7 @@ class Optimizer:
             self._seed,
         )
         self._admissible = admissible
+        self._repeat = repeat
         for theta in self._initial:
             if not self._may_ask(theta):
                 raise ValueError(f"the start point {theta.tolist()} does not keep the conditions: leave it out")
@@ -145,6 +151,7 @@ class Optimizer:
             mean="zero",
             priors=False,
             noise=0.01**2,
+            repeat=False,
         )
 
     @property
@@ -174,7 +181,7 @@ class Optimizer:
         done = [i for i, trial in enumerate(self.trials) if trial.cost is not None]
         if len(done) < 2:
             return Estimate(self.trials.index(best), best.theta, best.cost, best.cost, best.cost)
-        return self._believe().estimate(self._history.keeps_limits)
+        return self._believe().estimate(self._keeps_limits)
 
     @property
     def timings(self) -> Timings:
@@ -290,46 +297,58 @@ class Optimizer:
         fitted = time.perf_counter()
         # Matrices this small only lose time on threads, and last bits with their number.
         with threadpool_limits(1):
-            unit = self._maximise(belief, np.array([self.space.to_unit(theta) for theta in waiting]))
+            units = np.array([self.space.to_unit(theta) for theta in waiting])
+            theta = self._maximise(belief, units.reshape(-1, self.space.dimension))
         self._timings = Timings(fitted - start, time.perf_counter() - fitted)
-        return self.space.from_unit(unit)
+        return theta
 
     def _maximise(self, belief: Belief, waiting: NDArray) -> NDArray:
+        """The theta of most merit; `waiting` are the pending ones in the unit cube."""
         rng = self._generator(1, len(waiting))
-        kept = belief.rows_that(self._history.keeps_limits)
+        kept = belief.rows_that(self._keeps_limits)
         constraints = self._constraints(belief)
-        taken = belief.units
         order = np.argsort(belief.data.targets, kind="stable")
         if len(kept):
             order = kept[np.argsort(belief.data.targets[kept], kind="stable")]
-            cost, best = self._worlds(belief, kept, waiting, rng)
+            cost, best = self._worlds(belief, kept, waiting, _likely(waiting, constraints), rng)
             merit = Merit(self._acquisition, cost, best, constraints)
         else:
             merit = Merit(self._acquisition, None, np.zeros(1), constraints)
         incumbents = belief.data.points[order[:_INCUMBENTS]]
-        if len(waiting):
-            taken = np.vstack([taken, waiting])
+        taken = np.vstack([belief.units, waiting])
+        if may_repeat := self._repeat and len(kept) and not len(waiting) and belief.noisy:
+            theta = self.trials[belief.data.rows[order[0]]].theta
+            if _is_time_to_repeat(len(self.trials)) and self._may_ask(theta):
+                return theta
         unit, value = maximise(merit, taken, incumbents, rng, lambda x: self._may_ask(self.space.from_unit(x)))
-        if len(kept) and not len(waiting) and belief.noisy:
-            told = belief.data.points[kept]
-            again = merit(told)
-            if again.max() > value and self._may_ask(self.space.from_unit(told[again.argmax()])):
-                return told[again.argmax()]
-        return unit
+        if may_repeat:
+            again = merit(belief.data.points[kept])
+            theta = self.trials[belief.data.rows[kept[again.argmax()]]].theta
+            if again.max() > value and self._may_ask(theta):
+                return theta
+        return self.space.from_unit(unit)
 
     def _worlds(
-        self, belief: Belief, kept: NDArray, waiting: NDArray, rng: np.random.Generator
+        self, belief: Belief, kept: NDArray, waiting: NDArray, likely: NDArray, rng: np.random.Generator
     ) -> tuple[Posterior, NDArray]:
-        """The cost's process and the best in each world of what is not known: costs to come, and noise."""
+        """The cost's process and the best in each world of what is not known: costs to come, and noise.
+
+        Of the pending points only those that are `likely` to keep the constraints may be the best.
+        """
         if self._acquisition.noisy:
             cost = belief.hidden(waiting, _HIDDEN_WORLDS, rng)
-            rivals = np.vstack([belief.data.points[kept], waiting]) if len(waiting) else belief.data.points[kept]
+            rivals = np.vstack([belief.data.points[kept], likely])
             return cost, cost.predict(rivals)[0].min(axis=0)
-        observed = belief.data.targets[kept].min()
+        best = belief.data.targets[kept].min()
+        if self._repeat and len(self.trials) % 2:
+            best = belief.cost.predict(belief.data.points[kept])[0].min()
         if not len(waiting):
-            return belief.cost, np.array([observed])
+            return belief.cost, np.array([best])
         cost = belief.imagined(waiting, _FANTASIES, rng)
-        return cost, np.minimum(observed, cost.predict(waiting)[0].min(axis=0))
+        return cost, np.vstack([cost.predict(likely)[0], np.full((1, _FANTASIES), best)]).min(axis=0)
+
+    def _keeps_limits(self, trial: Trial) -> bool:
+        return keeps_limits(trial, self._history.limits)
 
     def _may_ask(self, theta: NDArray) -> bool:
         return self._admissible is None or bool(self._admissible(theta))
@@ -359,6 +378,19 @@ class Optimizer:
 
     def _generator(self, *purpose: int) -> np.random.Generator:
         return np.random.default_rng([self._seed, len(self.trials), *purpose])
+
+
+def _likely(points: NDArray, constraints: Sequence[Constraint]) -> NDArray:
+    """Those of the points (m, d) that keep the constraints with a probability of a half or more."""
+    if not len(points) or not constraints:
+        return points
+    chance = np.sum([constraint.log_probability(points) for constraint in constraints], axis=0)
+    return points[chance >= np.log(0.5)]
+
+
+def _is_time_to_repeat(told: int) -> bool:
+    """Whether the best is asked again to see the noise: after 20, 40, 80, ... trials."""
+    return told >= _FIRST_REPEAT and told % _FIRST_REPEAT == 0 and (told // _FIRST_REPEAT).bit_count() == 1
 
 
 def _count(name: str, value: int) -> int:

@@ -150,15 +150,16 @@ class History:
         """Record a checked trial."""
         self.trials = (*self.trials, trial)
 
-    def keeps_limits(self, trial: Trial) -> bool:
-        """Whether the trial has a cost and nothing measured was beyond its limit."""
-        return trial.cost is not None and all(trial.measured[name] <= limit for name, limit in self.limits.items())
-
     @property
     def best(self) -> Trial | None:
         """The first trial with the lowest cost of those that kept all limits; None while there is none."""
-        done = [trial for trial in self.trials if self.keeps_limits(trial)]
+        done = [trial for trial in self.trials if keeps_limits(trial, self.limits)]
         return min(done, key=lambda trial: trial.cost if trial.cost is not None else np.inf, default=None)
+
+
+def keeps_limits(trial: Trial, limits: Mapping[str, float]) -> bool:
+    """Whether the trial has a cost and nothing that was measured is beyond its limit."""
+    return trial.cost is not None and all(trial.measured[name] <= limit for name, limit in limits.items())
 
 
 def _number(what: str, value: float, hint: str = "") -> float:

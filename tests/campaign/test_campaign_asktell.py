@@ -226,7 +226,7 @@ class TestStartPoints:
 
 def test_cutting_saves_the_robots_time_and_changes_no_J(toy_study, tmp_path):
     whole = replace(toy_study, give_up=None, iterations=0).run(tmp_path / "whole", progress=None)
-    cut = replace(toy_study, iterations=0).run(tmp_path / "cut", progress=None)
+    cut = replace(toy_study, give_up=3.0, iterations=0).run(tmp_path / "cut", progress=None)
     assert whole.saved_seconds == 0
     assert whole.plant_seconds == pytest.approx(6 * 1.0)
     assert cut.saved_seconds > 0
@@ -238,3 +238,53 @@ def test_cutting_saves_the_robots_time_and_changes_no_J(toy_study, tmp_path):
         else:
             assert ours.J == theirs.J
             best = min(best, ours.J)
+
+
+def test_a_cost_of_minus_nothing_does_no_harm(toy_study, tmp_path):
+    with Campaign(toy_study, tmp_path / "run") as campaign:
+        campaign.ask()
+        campaign.tell(1, cost=-0.0)
+    with Journal(tmp_path / "run" / "journal.sqlite") as journal:
+        assert journal.trials()[0].J == 0.0
+
+
+def test_a_robot_that_is_flung_beyond_all_measure_is_one_trial_and_not_the_end(toy_study, tmp_path):
+    class Flung(type(toy_study.plant)):
+        def measured(self):
+            return np.full(2, 1e60)
+
+    study = replace(toy_study, plant=Flung(), mpc=replace(toy_study.mpc, output_bounds=None), give_up=None)
+    result = replace(study, iterations=2).run(tmp_path / "run", progress=None)
+    assert result.complete
+
+
+def test_what_the_journal_refused_the_search_was_not_told(toy_study, tmp_path, monkeypatch):
+    with Campaign(toy_study, tmp_path / "run") as campaign:
+        for number in range(1, 8):
+            campaign.ask()
+            if number < 7:
+                campaign.tell(number, cost=float(number))
+        with monkeypatch.context() as full:
+
+            def refuse(*_):
+                raise JournalError("no space")
+
+            full.setattr(campaign._journal, "add_told", refuse)
+            with pytest.raises(JournalError, match="no space"):
+                campaign.tell(7, cost=0.5)
+        campaign.tell(7, cost=0.5)
+        following = campaign.ask()
+    with Campaign(toy_study, tmp_path / "again") as campaign:
+        for number in range(1, 8):
+            campaign.ask()
+            campaign.tell(number, cost=float(number) if number < 7 else 0.5)
+        assert campaign.ask().theta.tolist() == following.theta.tolist()
+
+
+def test_a_journal_of_trials_whose_settings_are_gone_is_not_gone_on_with(toy_study, tmp_path):
+    with Campaign(toy_study, tmp_path / "run") as campaign:
+        campaign.ask()
+        campaign.tell(1, cost=1.0)
+    (tmp_path / "run" / "study.json").unlink()
+    with pytest.raises(RunError, match=r"holds trials, but no study\.json"):
+        Campaign(replace(toy_study, seed=5), tmp_path / "run", resume=True)

@@ -152,6 +152,16 @@ class TestExecutors:
             result = study.run(tmp_path / "two", jobs=2, executor=executor, script=file, progress=None)
         assert outcomes(result) == outcomes(study.run(tmp_path / "one", progress=None))
 
+    def test_so_do_start_points(self, script, tmp_path):
+        file = script(settings="seed_points=3, iterations=0, give_up=None")
+        study = load_study(file)
+        middle = [0.5 * (entry.lower + entry.upper) + 1e-3 for entry in study.mpc.model.entries]
+        with concurrent.futures.ThreadPoolExecutor(2) as executor:
+            started = replace(study, initial=[middle])
+            result = started.run(tmp_path / "two", jobs=2, executor=executor, script=file, progress=None)
+        first = next(trial for trial in result.trials if trial.number == 1)
+        assert first.theta.tolist() == middle
+
     @pytest.mark.parametrize("jobs", [0, -1, 1.5, "two"])
     def test_a_number_of_jobs_is_one(self, toy_study, tmp_path, jobs):
         with pytest.raises(ValueError, match="jobs is the number of trials at once, at least 1, not"):
@@ -263,6 +273,15 @@ class TestTimeouts:
             (tmp_path / "go").touch()
         assert [trial.number for trial in result.trials if trial.outcome == "failed"] == [1]
         assert len(result.trials) == 6
+
+    def test_a_trial_that_waits_in_a_queue_has_not_failed(self, script, tmp_path, monkeypatch):
+        settings = "search='sobol', seed_points=4, iterations=0, time_limit=5.0"
+        file = script("if self.trial == 1 and self.once():\n            time.sleep(1.5)", settings)
+        monkeypatch.setattr(_loop, "GRACE", -4.0)
+        study = load_study(file)
+        with concurrent.futures.ThreadPoolExecutor(1) as executor:
+            result = study.run(tmp_path / "run", jobs=4, executor=executor, script=file, progress=None)
+        assert [trial.number for trial in result.trials if trial.outcome == "failed"] == [1]
 
 
 class TestStops:

@@ -217,6 +217,8 @@ def test_a_fault_is_one_sentence_with_its_place_and_value(recorded, study, tmp_p
         (b"t\ty1\ty2\n", "has tabs between its columns"),
         (b"time,left,right\n0,1,2\n", r"lacks t, y1, .*\(its first line is 'time,left,right'\)"),
         (b"\xff\xfe\x00\x01", "is no text in UTF-8"),
+        (b't,y1,y2\n0,"1\n",2\n', "line 2: .*a row is one line of numbers between commas"),
+        (b"t,y1,y2\n0,1," + b"2" * 200_000 + b"\n", "line 2: .*a row is one line of numbers between commas"),
     ],
 )
 def test_so_is_a_file_of_another_kind(study, tmp_path, content, words):

@@ -1,12 +1,17 @@
 """A run folder says what was run, whatever the robot is made of."""
 
 import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import casadi as ca
+import numpy as np
 import pytest
 
 from socasadi import Circle, Cost, LinearMPC, Modal, SimulatedPlant, Study
+from socasadi.campaign.store import describe
 from socasadi.plant import ExternalPlantError
 from socasadi.rod import BSpline, Cable, Helix, Payload, Rod, Strain, Taper
 
@@ -50,3 +55,35 @@ def test_parameters_with_values_are_part_of_the_settings():
     settings = stored(soft.at([5e5]))  # a rod of numbers
     assert settings["plant"]["rod"]["divisions"][0]["material"]["young"] == 1e6
     assert Study.from_settings(settings).plant.rod == soft.at([5e5])
+
+
+def told_from(first, second):
+    return describe(first) != describe(second)
+
+
+def test_a_function_is_told_from_others_by_all_that_it_uses():
+    def made(k, table):
+        def helper(x):
+            return k * x
+
+        return lambda episode, mpc, at=3: helper(at) + table.sum()
+
+    known = made(1, np.arange(3))
+    assert not told_from(known, made(1, np.arange(3)))
+    assert told_from(known, made(2, np.arange(3)))
+    assert told_from(known, made(1, np.arange(4)))
+    assert told_from(lambda x, at=1: x, lambda x, at=2: x)
+    assert not told_from(np.max, np.max)
+    assert "0x" not in str(describe(np.max))
+
+
+def test_the_same_script_is_described_the_same_in_every_process():
+    code = "from socasadi.campaign.store import describe; print(describe(lambda x: x in {'a', 'b', 'c', 'd'})['code'])"
+    told = {
+        subprocess.run(
+            [sys.executable, "-c", code], env=os.environ | {"PYTHONHASHSEED": seed}, capture_output=True, text=True
+        ).stdout
+        for seed in ("1", "2", "3")
+    }
+    assert len(told) == 1
+    assert told != {""}

@@ -168,10 +168,11 @@ def test_while_all_trials_are_cut_it_keeps_exploring():
     assert repeats(told(search), 1e-3) == 0
 
 
-def test_experiments_cut_above_one_and_a_half_times_the_best_teach_as_much_as_whole_ones():
+@pytest.mark.parametrize("seed", [0, 2])
+def test_experiments_cut_above_one_and_a_half_times_the_best_teach_as_much_as_whole_ones(seed):
     def search(cut):
-        search = Optimizer(BRANIN, seed=0, seed_points=6)
-        for _ in range(20):
+        search = Optimizer(BRANIN, seed=seed, seed_points=6)
+        for _ in range(30):
             theta = search.ask()
             cost, best = branin(theta), search.best
             if cut and best is not None and cost > 1.5 * best.cost:
@@ -181,6 +182,6 @@ def test_experiments_cut_above_one_and_a_half_times_the_best_teach_as_much_as_wh
         return search
 
     whole, cut = search(False), search(True)
-    assert sum(trial.cost is None for trial in cut.trials) >= 5
-    assert whole.best.cost < BRANIN_MINIMUM + 0.05
-    assert cut.best.cost < BRANIN_MINIMUM + 0.05
+    assert sum(trial.cost is None for trial in cut.trials) >= 8
+    assert whole.best.cost < BRANIN_MINIMUM + 0.02
+    assert cut.best.cost < BRANIN_MINIMUM + 0.02

@@ -4,7 +4,7 @@ from ._campaign import Campaign
 from ._dask import DaskExecutor, dask_executor
 from ._flight import fly_once
 from ._loop import run_campaign
-from ._outcome import best_trial, kept_limits, replayed
+from ._outcome import best_trial, keeps_limits, replayed
 from ._processes import Processes
 from ._progress import Clock, Progress, clock, print_progress, progress_line
 from ._script import load_study
@@ -19,7 +19,7 @@ __all__ = [
     "clock",
     "dask_executor",
     "fly_once",
-    "kept_limits",
+    "keeps_limits",
     "load_study",
     "print_progress",
     "progress_line",

@@ -65,6 +65,8 @@ class Campaign:
         try:
             if started:
                 compare_settings(folder, study.settings, _MAY_DIFFER)
+            elif self.trials or self.pending:
+                raise RunError(f"{folder} holds trials, but no study.json that says of what: restore it from a copy")
             if len(self.trials) + len(self.pending) > study.trials:
                 raise RunError(
                     f"{folder} holds {len(self.trials) + len(self.pending)} trials already; ask for no fewer, not for "
@@ -152,7 +154,7 @@ class Campaign:
             raise RunError(f"all {self.study.trials} trials of {self.folder} were asked{out}; ask for more iterations")
         started = datetime.now(UTC).isoformat(timespec="seconds")
         theta = self._search.ask(pending=[asked.theta for asked in self.pending])
-        best, share = self.best, self.study.give_up
+        best, share = self.best, self.study.give_up if self.study.search != "paper" else None
         asked = Asked(
             number=number,
             phase="seed" if number <= self.study.seed_points else "search",
@@ -220,7 +222,11 @@ class Campaign:
             outcome["failure"] = reason.encode(errors="backslashreplace").decode()
         trial = Trial(**vars(replace(asked, seconds=spent)), told=self._events() + 1, **outcome)
         tell_search(self._search, trial)  # refuses what it cannot model, before it is stored
-        self._journal.add_told(trial, episode)
+        try:
+            self._journal.add_told(trial, episode)
+        except BaseException:
+            self._search = replayed(self.study.optimizer(), self._trials)
+            raise
         del self._pending[number]
         self._trials.append(trial)
         return trial

@@ -1,5 +1,6 @@
 """Trials on a Dask cluster."""
 
+import re
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future
 from typing import Any
@@ -73,6 +74,9 @@ def dask_executor(address: str) -> DaskExecutor:
         raise RunError(
             f"trials on a Dask cluster need the package distributed ({error}): pip install 'socasadi[distributed]'"
         ) from error
+    # A client that is given anything else waits for a minute at the end of the process.
+    if not re.fullmatch(r"(\w+://)?[^\s:/]+:\d+", address):
+        raise RunError(f"{address!r} is no address of a Dask scheduler: give one such as tcp://10.0.0.5:8786")
     try:
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
         client.wait_for_workers(1, timeout=_PATIENCE)

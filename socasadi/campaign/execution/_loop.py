@@ -13,6 +13,7 @@ from ..store import Asked, RunError, Trial
 from ._campaign import Campaign
 from ._flight import Flown, fly_trial
 from ._order import check_answer, check_not_ordered, fly_order, read_answer, script_of, write_order
+from ._outcome import broken_limits
 from ._processes import Processes
 from ._progress import Clock, Progress
 
@@ -70,7 +71,8 @@ class _Reporter:
         if self._progress is not None:
             done, total = len(campaign.trials), campaign.study.trials
             elapsed, remaining = self._clock.tick(total - done)
-            self._progress(Progress(trial, campaign.best, done, total, elapsed, remaining))
+            broken = tuple(broken_limits(trial, campaign.study))
+            self._progress(Progress(trial, campaign.best, done, total, elapsed, remaining, broken))
 
 
 def _to_fly(campaign: Campaign) -> Iterator[Asked]:
@@ -156,10 +158,17 @@ class _Away:
 
     def _give_up(self, asked: Asked, future: Future) -> None:
         reason = f"TimeoutError: no answer {GRACE:g} s after its limit of {self._campaign.study.time_limit:g} s"
+        if abandon := getattr(self._executor, "abandon", None):
+            ended = abandon(future)
+        elif future.cancel() and self._losses[asked.number] < _LOSSES - 1:
+            # It waited in a queue, and nobody flew it.
+            self._losses[asked.number] += 1
+            self._send(asked)
+            return
+        else:
+            ended = future.cancelled()
         # An executor that cannot end a worker is left with one that is busy for ever, as far as anybody knows.
-        abandon = getattr(self._executor, "abandon", Future.cancel)
-        if not abandon(future):
-            self._jobs -= 1
+        self._jobs -= not ended
         self._report(asked.number, Flown(None, reason, {}))
         if self._jobs == 0:
             raise RunError("every worker hangs in a trial; what was told is stored: resume with others")

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...plant import ExternalPlant
-from ..store import Asked, ForeignTypeError, RunError, differences, pack, unpack
+from ..store import Asked, ForeignTypeError, RunError, differences, pack, rebuild, unpack
 from ._flight import Flown, fly_trial
 from ._script import load_study
 
@@ -116,8 +116,9 @@ def _made(settings: dict[str, Any], script: str | None) -> "Study":
         study = Study.from_settings(settings)
     else:
         study = load_study(Path(script))
-        # What a command's options change, such as the seed, is one number or text.
-        study = replace(study, **{name: settings[name] for name, value in vars(study).items() if _plain(value)})
+        # What a command's options change, such as the seed or the start points, is numbers or text.
+        plain = [name for name, value in vars(study).items() if _plain(value)]
+        study = replace(study, **{name: rebuild(settings[name]) for name in plain})
     if changed := differences(settings, study.settings):
         raise RunError(f"{script or 'socasadi'} makes another study there: {'; '.join(changed)}")
     return study
@@ -134,4 +135,6 @@ def _makes(settings: dict[str, Any]) -> bool:
 
 
 def _plain(value: object) -> bool:
+    if isinstance(value, tuple):
+        return all(_plain(item) for item in value)
     return value is None or isinstance(value, bool | int | float | str)

@@ -34,18 +34,25 @@ def judged(study: "Study", episode: Episode) -> dict[str, Any]:
     return about | {"outcome": "done", "J": score.J, "score": score, "measured": measured or None}
 
 
-def kept_limits(trials: Sequence[Trial], study: "Study") -> list[Trial]:
-    """The trials that are done and kept all limits of ``study``."""
+def keeps_limits(trial: Trial, study: "Study") -> bool:
+    """Whether a trial is done and kept all limits of ``study``."""
+    return trial.J is not None and all((trial.measured or {})[limit.name] <= limit.limit for limit in study.limits)
+
+
+def broken_limits(trial: Trial, study: "Study") -> list[str]:
+    """What a trial that is done measured beyond the limits of ``study``, in words."""
+    measured = trial.measured or {}
     return [
-        trial
-        for trial in trials
-        if trial.J is not None and all((trial.measured or {})[limit.name] <= limit.limit for limit in study.limits)
+        f"{limit.name} {measured[limit.name]:.3g} above {limit.limit:g} {limit.unit}".rstrip()
+        for limit in study.limits
+        if trial.J is not None and measured[limit.name] > limit.limit
     ]
 
 
 def best_trial(trials: Sequence[Trial], study: "Study") -> Trial | None:
     """The trial of least J among those that kept all limits, the first of equals; None without one."""
-    return min(kept_limits(trials, study), key=lambda trial: trial.J or 0.0, default=None)
+    kept = (trial for trial in trials if keeps_limits(trial, study))
+    return min(kept, key=lambda trial: trial.J or 0.0, default=None)
 
 
 def replayed(search: Search, trials: Sequence[Trial]) -> Search:

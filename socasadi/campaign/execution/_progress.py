@@ -16,6 +16,8 @@ class Progress:
         Numbers of trials, told and in all; side by side they are not told in the order of their numbers.
     elapsed, remaining
         s of wall time in this session, and to the end at the pace of the last trials.
+    broken
+        The limits that the trial did not keep, in words.
     """
 
     trial: Trial
@@ -24,6 +26,7 @@ class Progress:
     total: int
     elapsed: float
     remaining: float
+    broken: tuple[str, ...] = ()
 
 
 class Clock:
@@ -49,14 +52,15 @@ def progress_line(progress: Progress, *, short: bool = False) -> str:
     """The line: trial, its J, the best J, time elapsed and remaining; ``short`` for beside a bar that counts trials."""
     trial, best = progress.trial, progress.best
     times = clock(progress.elapsed), clock(progress.remaining)
+    nothing = "limits not kept yet" if progress.broken else "no success yet"
     if short:
-        outcome = _outcome(trial, ".4g")
-        incumbent = "no success yet" if best is None else f"best {best.J:.4g} (trial {best.number})"
+        outcome = _outcome(trial, ".4g") + ("!" if progress.broken else "")
+        incumbent = nothing if best is None else f"best {best.J:.4g} (trial {best.number})"
         return f"{outcome:12} {incumbent:24} {times[0]} + {times[1]} left"
     width = len(str(progress.total))
     outcome = f"{_outcome(trial, '12.5g'):>14}"
-    incumbent = f"best {best.J:10.5g} (trial {best.number})" if best is not None else "no success yet"
-    reason = f"  {trial.failure}" if trial.outcome == "failed" else ""
+    incumbent = f"best {best.J:10.5g} (trial {best.number})" if best is not None else nothing
+    reason = f"  {trial.failure}" if trial.outcome == "failed" else "".join(f"  {told}" for told in progress.broken)
     return (
         f"trial {trial.number:{width}}/{progress.total}  {outcome}  {incumbent}  "
         f"{times[0]} elapsed, {times[1]} left{reason}"

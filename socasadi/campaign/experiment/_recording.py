@@ -143,8 +143,16 @@ def _table(path: Path) -> tuple[list[str], list[_Row]]:
     for sign, name in ((";", "semicolons"), ("\t", "tabs")):
         if sign in heading and "," not in heading:
             raise RecordingError(f"{path} has {name} between its columns: save it with commas, and points in numbers")
-    cells = [[cell.strip() for cell in row] for row in csv.reader(line for _, line in lines)]
-    return cells[0], [(line, row) for (line, _), row in zip(lines[1:], cells[1:], strict=True)]
+    rows = [(number, _cells(path, number, line)) for number, line in lines]
+    return rows[0][1], rows[1:]
+
+
+def _cells(path: Path, number: int, line: str) -> list[str]:
+    try:
+        (row,) = csv.reader([line], strict=True)
+    except csv.Error as error:
+        raise RecordingError(f"{path}, line {number}: {error}; a row is one line of numbers between commas") from None
+    return [cell.strip() for cell in row]
 
 
 def _placed(path: Path, headings: list[str], columns: dict[str, str], optional: set[str]) -> dict[str, int]:

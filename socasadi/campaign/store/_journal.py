@@ -2,6 +2,7 @@ import contextlib
 import fcntl
 import os
 import sqlite3
+import time
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -28,6 +29,10 @@ _DAMAGE = (
     *(sqlite3.DatabaseError, ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError),
     *(OverflowError, MemoryError, NotImplementedError, zlib.error, BadZipFile),
 )
+
+
+# s for which a writer waits for another: what a colleague asks or tells is soon done.
+_PATIENCE = 3.0
 
 
 class JournalError(RuntimeError):
@@ -217,15 +222,24 @@ def _read_mode(path: Path) -> str:
     return "rw" if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK) else "ro&immutable=1"
 
 
-def _lock(path: Path) -> int:
-    """Hold the folder's lock for as long as the file stays open; the kernel lets go of it when the process dies."""
-    handle = os.open(path.with_name("lock"), os.O_RDWR | os.O_CREAT, 0o644)
+def _taken(handle: int) -> bool:
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        holder = os.read(handle, 32).decode(errors="replace").strip() or "unknown"
-        os.close(handle)
-        raise JournalError(f"{path.parent} is being written by process {holder}; wait for it, or stop it") from None
+        return False
+    return True
+
+
+def _lock(path: Path) -> int:
+    """Hold the folder's lock for as long as the file stays open; the kernel lets go of it when the process dies."""
+    handle = os.open(path.with_name("lock"), os.O_RDWR | os.O_CREAT, 0o644)
+    deadline = time.monotonic() + _PATIENCE
+    while not _taken(handle):
+        if time.monotonic() > deadline:
+            holder = os.read(handle, 32).decode(errors="replace").strip() or "unknown"
+            os.close(handle)
+            raise JournalError(f"{path.parent} is being written by process {holder}; wait until it is done")
+        time.sleep(0.1)
     # On a full disk the name is missing, not the lock.
     with contextlib.suppress(OSError):
         os.ftruncate(handle, 0)

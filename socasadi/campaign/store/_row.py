@@ -60,7 +60,8 @@ FLIGHT_COLUMNS = ("name", "theta", "J", "score", "failure", "record_checksum", "
 def trial_row(trial: Asked, episode: Episode | None = None) -> dict[str, Any]:
     """A trial with its record."""
     row: dict[str, Any] = {name: getattr(trial, name, None) for name in TRIAL_COLUMNS[:-2]}
-    row |= {name: float(row[name]) for name in _REAL if row[name] is not None}
+    # SQLite has no negative zero.
+    row |= {name: float(row[name]) + 0.0 for name in _REAL if row[name] is not None}
     row["theta"], row["seconds"] = json.dumps(trial.theta.tolist()), json.dumps(trial.seconds)
     row["by_hand"] = int(trial.by_hand)
     if isinstance(trial, Trial):
@@ -90,7 +91,7 @@ def flight_row(flight: Flight) -> dict[str, Any]:
     row = {
         "name": flight.name,
         "theta": None if flight.theta is None else json.dumps(flight.theta.tolist()),
-        "J": None if flight.score is None else flight.score.J,
+        "J": None if flight.score is None else flight.score.J + 0.0,
         "score": None if flight.score is None else json.dumps(asdict(flight.score)),
         "failure": flight.episode.failure,
     }

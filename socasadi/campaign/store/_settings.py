@@ -5,7 +5,7 @@ import hashlib
 import importlib
 import inspect
 from collections.abc import Callable
-from types import CodeType, FunctionType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,8 @@ def describe(value: Any) -> Any:
             return {str(key): describe(item) for key, item in value.items()}
     if inspect.isfunction(value):
         return {"type": _public_name(value), **_body(value)}
+    if callable(value) and hasattr(value, "__qualname__"):  # of a library, written in C or dispatched
+        return {"type": f"{value.__module__}.{value.__qualname__}"}
     if type(value).__str__ is not object.__str__:
         return {"type": _public_name(type(value)), "source": str(value)}
     if dataclasses.is_dataclass(value):
@@ -74,16 +76,29 @@ def differences(old: Any, new: Any, path: str = "") -> list[str]:
 
 
 def _body(function: FunctionType) -> dict[str, Any]:
-    """What a function does: a digest of its code, and the numbers and texts around it that it uses."""
+    """What a function does: a digest of its code, its defaults, and the values and functions around it that it uses."""
     variables = inspect.getclosurevars(function)
-    uses = {**variables.globals, **variables.nonlocals}
-    plain = {name: value for name, value in uses.items() if isinstance(value, int | float | str | list | tuple)}
-    return {"code": hashlib.sha256(_code(function.__code__).encode()).hexdigest()[:16], "uses": describe(plain)}
+    uses = {**variables.globals, **variables.nonlocals, **(function.__kwdefaults__ or {})}
+    uses |= {f"default {i}": value for i, value in enumerate(function.__defaults__ or ())}
+    # What calls itself is described once, and a module by its name alone.
+    told = {name: describe(value) for name, value in uses.items() if value is not function and not _is_module(value)}
+    return {"code": hashlib.sha256(_code(function.__code__).encode()).hexdigest()[:16], "uses": told}
+
+
+def _is_module(value: Any) -> bool:
+    return isinstance(value, ModuleType)
 
 
 def _code(code: CodeType) -> str:
-    constants = [_code(item) if isinstance(item, CodeType) else repr(item) for item in code.co_consts]
+    constants = [_constant(item) for item in code.co_consts]
     return f"{code.co_code.hex()} {constants} {code.co_names}"
+
+
+def _constant(item: Any) -> str:
+    if isinstance(item, CodeType):
+        return _code(item)
+    # The order of a set is another in each process.
+    return repr(sorted(map(repr, item))) if isinstance(item, frozenset) else repr(item)
 
 
 def _public_name(kind: type | Callable[..., Any]) -> str:

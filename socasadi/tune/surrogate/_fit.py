@@ -158,6 +158,7 @@ def fit(
     rng: np.random.Generator,
     known: NDArray | None = None,
     start: Hyperparameters | None = None,
+    least_noise: float = 0.0,
 ) -> Hyperparameters:
     """Return the hyperparameters of maximum marginal likelihood (with priors: maximum a posteriori).
 
@@ -174,6 +175,8 @@ def fit(
         Variance of each target's own noise, where that is known; the common noise comes on top.
     start : Hyperparameters, optional
         Of an earlier fit by the same settings: the only start.
+    least_noise : float
+        Lower bound of a fitted noise variance.
 
     Raises
     ------
@@ -181,6 +184,7 @@ def fit(
         A point or value that is not finite: GPy would return its start values without a word.
     """
     loss = _loss(points, targets, settings, known)
+    loss.bounds[loss.noise, 0] = np.log(np.clip(least_noise, *NOISE_BOUNDS))
     starts = loss.starts(rng) if start is None else [loss.position(start)]
     return loss.hyperparameters(descend(loss, starts, loss.bounds))
 

@@ -56,8 +56,6 @@ class Transform:
             raise ValueError(
                 f'the cost is {cost} and its logarithm or power is modelled: use transform="power" for J <= 0'
             )
-        if abs(cost) > 1e100:
-            raise ValueError(f"the cost is {cost}, too large to be a cost: tell failed=True")
 
 
 def _same(costs: NDArray) -> Scale:
