@@ -254,12 +254,12 @@ def test_a_recording_that_ends_early_counts_once_it_proves_enough(at_the_bench, 
     assert first["give_up"] is None
     socasadi("tell", "runs/study", "--trial", 1, "--cost", 0.01)
     (second,) = asked(socasadi)
-    assert second["give_up"] == pytest.approx(0.03)
+    assert second["give_up"] == pytest.approx(0.1)
     lines = Path(recording(second)).read_text().splitlines()
-    Path("short.csv").write_text("\n".join(lines[:8]) + "\n")
+    Path("short.csv").write_text("\n".join(lines[:12]) + "\n")
     said = socasadi("tell", "runs/study", "--trial", 2, "--csv", "short.csv")
     assert "cut: J is at least" in said
-    assert "0.75 s were spared" in said
+    assert "0.55 s were spared" in said
     assert "was spared 0:01 by cutting 1 hopeless trial" in socasadi("show", "runs/study")
 
 

@@ -26,7 +26,8 @@ def journal(tmp_path_factory):
     from socasadi import LinearMPC, Modal, Study
 
     mpc, folder = LinearMPC(Modal()), tmp_path_factory.mktemp("journal") / "run"
-    study = Study(plant=ToyPlant(), mpc=mpc, task=ShortCircle(), seed_points=6, iterations=0, verifications=1)
+    counts = {"seed_points": 6, "iterations": 0, "verifications": 1}
+    study = Study(plant=ToyPlant(), mpc=mpc, task=ShortCircle(), give_up=3.0, **counts)
     assess(study.run(folder, progress=None))
     with Campaign(replace(study, iterations=3), folder, resume=True) as campaign:
         campaign.tell(campaign.ask().number, failed="fell")

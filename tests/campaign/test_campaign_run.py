@@ -282,7 +282,7 @@ def test_ctrl_c_that_a_library_drops_still_ends_the_run_and_loses_no_trial(toy_s
 
 def test_each_trial_is_reported_with_its_outcome_the_best_and_the_time_left(toy_study, tmp_path):
     told = []
-    replace(toy_study, iterations=0).run(tmp_path / "run", progress=told.append)
+    replace(toy_study, give_up=3.0, iterations=0).run(tmp_path / "run", progress=told.append)
     lines = [progress_line(progress) for progress in told]
     assert [progress.done for progress in told] == [1, 2, 3, 4, 5, 6]
     cut = next(progress for progress in told if progress.trial.outcome == "cut")
