@@ -137,7 +137,9 @@ def _summary(result: Result, baseline: Result, assessment: Assessment) -> None:
         out.print(told.removeprefix("; "))
     if assessment.verdicts:
         (factor, unit), left = distance(result.study), ("theta",)
-        headings = ("theta", "J (median)", f"RMSE / {unit} (median, worst)", "failed", f"open-loop error / {unit}")
+        limited = ("broke a limit",) if result.study.limits else ()
+        headings = ("theta", "J (median)", f"RMSE / {unit} (median, worst)", "failed", *limited)
+        headings = (*headings, f"open-loop error / {unit}")
         title = f"\neach theta flown {result.study.verifications} times under fresh noise:"
         judged = table(*headings, left=left, title=title)
         for name, verdict in assessment.verdicts.items():
@@ -145,7 +147,8 @@ def _summary(result: Result, baseline: Result, assessment: Assessment) -> None:
             if len(verdict.J):
                 rmse = factor * verdict.rmse
                 flown = (f"{np.median(verdict.J):.4g}", f"{np.median(rmse):.3f}, {rmse.max():.3f}")
-            judged.add_row(name, *flown, str(verdict.failed), f"{factor * verdict.prediction_error:.2f}")
+            counts = (str(verdict.failed), str(verdict.broken)) if limited else (str(verdict.failed),)
+            judged.add_row(name, *flown, *counts, f"{factor * verdict.prediction_error:.2f}")
         out.print(judged)
         if assessment.unidentified:
             out.print(f"no model was identified: {assessment.unidentified}")

@@ -10,7 +10,7 @@ from ..model import identify, prediction_error
 from ..mpc import DesignError
 from ..plant import ExternalPlant
 from ._result import Result
-from .execution import fly_once
+from .execution import flown_cost, fly_once
 from .experiment import Episode, probe
 from .store import Flight, Journal, journal_path
 
@@ -28,8 +28,8 @@ class Verdict:
         (size,).
     J, rmse
         (verifications,) of the flights that did not fail; rmse in m.
-    failed
-        Number of flights that did.
+    failed, broken
+        Numbers of flights that failed, and of those that broke a limit of the study.
     prediction_error
         Open-loop root mean square distance on a probing record that it was not fitted to, m; NaN without one.
     """
@@ -38,6 +38,7 @@ class Verdict:
     J: np.ndarray
     rmse: np.ndarray
     failed: int
+    broken: int
     prediction_error: float
 
 
@@ -110,12 +111,14 @@ def assess(
         for name, theta in thetas.items():
             notify(f"flying {name} {study.verifications} times")
             flights = [_verification(result, journal, name, i, theta) for i in range(1, study.verifications + 1)]
-            scores = [flight.score for flight in flights if flight is not None and flight.score is not None]
+            flown = [flight for flight in flights if flight is not None and flight.score is not None]
+            scores = [flight.score for flight in flown if flight.score is not None]
             verdicts[name] = Verdict(
                 theta,
                 J=np.array([score.J for score in scores]),
                 rmse=np.array([score.rmse for score in scores]),
                 failed=study.verifications - len(scores),
+                broken=sum(np.isinf(flown_cost(flight, study)) for flight in flown),
                 prediction_error=prediction_error(study.mpc.model, theta, judged.record) if judged else np.nan,
             )
     return Assessment(verdicts, unidentified)

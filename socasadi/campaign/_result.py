@@ -9,7 +9,7 @@ import numpy as np
 from ..export import ControllerRecord, export
 from ..tune import Estimate
 from ._provenance import provenance
-from .execution import best_trial, keeps_limits, replayed
+from .execution import best_trial, flown_cost, keeps_limits, replayed
 from .experiment import Episode
 from .store import Asked, Flight, Journal, RunError, Trial, journal_path, read_settings
 
@@ -67,10 +67,8 @@ class Result:
         """The best observed: of least J among those that kept all limits; RunError when none did."""
         best = best_trial(self.trials, self.study)
         if best is None:
-            reasons = "; ".join(sorted({trial.failure or "a limit was not kept" for trial in self.trials})[:3])
-            raise RunError(
-                f"none of the {len(self.trials)} trials in {self.folder} succeeded: {reasons or 'none was made'}"
-            )
+            reasons = "; ".join(self._why_none_succeeded()[:3])
+            raise RunError(f"none of the {len(self.trials)} trials in {self.folder} succeeded: {reasons}")
         return best
 
     @functools.cached_property
@@ -85,19 +83,32 @@ class Result:
     def chosen(self) -> Trial:
         """The trial whose controller is exported.
 
-        Of those that :func:`assess` flew again it is the one of least mean J (one that failed there comes last), since
-        the best observed owes a part of its J to the noise; while the best has not been flown again it is the best.
+        Of those that :func:`assess` flew again it is the one of least mean J (one that failed or broke a limit there
+        comes last), since the best observed owes a part of its J to the noise; while the best has not been flown again
+        it is the best.
         """
         best = self.best
         costs: dict[tuple[float, ...], list[float]] = {}
         for flight in self.flights().values():
             if flight.theta is not None:
-                J = np.inf if flight.score is None else flight.score.J
-                costs.setdefault(tuple(flight.theta.tolist()), []).append(J)
+                costs.setdefault(tuple(flight.theta.tolist()), []).append(flown_cost(flight, self.study))
         if tuple(best.theta.tolist()) not in costs:
             return best
         flown = [trial for trial in self.trials if self.kept(trial) and tuple(trial.theta.tolist()) in costs]
         return min(flown, key=lambda trial: np.mean(costs[tuple(trial.theta.tolist())]))
+
+    def _why_none_succeeded(self) -> list[str]:
+        done = [trial.measured or {} for trial in self.trials if trial.J is not None]
+        least = {limit: min(measured[limit.name] for measured in done) for limit in self.study.limits if done}
+        broken = [
+            f"{limit.name} was {value:.3g} {limit.unit} at least, above its limit of {limit.limit:g}"
+            for limit, value in least.items()
+            if value > limit.limit
+        ]
+        if done and not broken:
+            broken = [f"none kept all of {', '.join(limit.name for limit in self.study.limits)} at once"]
+        failures = sorted({trial.failure for trial in self.trials if trial.failure})
+        return broken + failures or [f"none was told, {len(self.pending)} are out" if self.pending else "none was made"]
 
     def kept(self, trial: Trial) -> bool:
         """Whether a trial is done and kept all limits of the study."""

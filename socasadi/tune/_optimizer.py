@@ -171,16 +171,13 @@ class Optimizer:
 
     @property
     def best_estimated(self) -> Estimate | None:
-        """The told theta whose cost without noise is believed to be the lowest, and how sure that is; None before any.
+        """The told theta whose cost without noise is believed to be the lowest, and how sure that is.
 
-        Of trials that kept all limits. The luckiest of many noisy costs is too good to be true; this is not.
+        Of trials that kept all limits; None before there are two costs. The luckiest of many noisy costs is too good to
+        be true; this is not.
         """
-        best = self.best
-        if best is None or best.cost is None:
+        if self.best is None or sum(trial.cost is not None for trial in self.trials) < 2:
             return None
-        done = [i for i, trial in enumerate(self.trials) if trial.cost is not None]
-        if len(done) < 2:
-            return Estimate(self.trials.index(best), best.theta, best.cost, best.cost, best.cost)
         return self._believe().estimate(self._keeps_limits)
 
     @property

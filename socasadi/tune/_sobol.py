@@ -84,11 +84,8 @@ class SobolSearch:
 
     @property
     def best_estimated(self) -> Estimate | None:
-        """The best observed trial, as it was observed: nothing is estimated here."""
-        best = self.best
-        if best is None or best.cost is None:
-            return None
-        return Estimate(self.trials.index(best), best.theta, best.cost, best.cost, best.cost)
+        """None: nothing is estimated here."""
+        return None
 
     @property
     def timings(self) -> Timings:

@@ -4,7 +4,7 @@ from ._campaign import Campaign
 from ._dask import DaskExecutor, dask_executor
 from ._flight import fly_once
 from ._loop import run_campaign
-from ._outcome import best_trial, keeps_limits, replayed
+from ._outcome import best_trial, flown_cost, keeps_limits, replayed
 from ._processes import Processes
 from ._progress import Clock, Progress, clock, print_progress, progress_line
 from ._script import load_study
@@ -18,6 +18,7 @@ __all__ = [
     "best_trial",
     "clock",
     "dask_executor",
+    "flown_cost",
     "fly_once",
     "keeps_limits",
     "load_study",

@@ -56,6 +56,7 @@ class Campaign:
             raise RunError(f"{folder} is a file; name a folder for the run")
         if folder.exists() and any(folder.iterdir()) and not resume:
             raise RunError(f"{folder} exists already; resume it (--resume), or name another folder")
+        study.optimizer()  # refuses what cannot be searched, before anything is written
         started = begun(folder)
         if started and not settings_path(folder).exists():
             raise RunError(f"{folder} is no run folder: it has no study.json")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...tune import Search
 from ..experiment import Episode, measure_limits
-from ..store import Trial
+from ..store import Flight, Trial
 
 if TYPE_CHECKING:
     from .._study import Study
@@ -37,6 +37,14 @@ def judged(study: "Study", episode: Episode) -> dict[str, Any]:
 def keeps_limits(trial: Trial, study: "Study") -> bool:
     """Whether a trial is done and kept all limits of ``study``."""
     return trial.J is not None and all((trial.measured or {})[limit.name] <= limit.limit for limit in study.limits)
+
+
+def flown_cost(flight: Flight, study: "Study") -> float:
+    """J of a flight beside the search; infinity when it failed or broke a limit of ``study``."""
+    if flight.score is None:
+        return math.inf
+    measured = measure_limits(study.limits, flight.episode, study.mpc)
+    return flight.score.J if all(measured[limit.name] <= limit.limit for limit in study.limits) else math.inf
 
 
 def broken_limits(trial: Trial, study: "Study") -> list[str]:
