@@ -68,8 +68,9 @@ def convergence(trials: list[Trial], kept: Callable[[Trial], bool], baseline: li
     axes.yaxis.set_major_formatter(FuncFormatter(lambda J, _: f"{J:g}"))
     axes.yaxis.set_minor_locator(NullLocator())
     if known:
-        axes.set_ylim(min(known) / 1.5, min(1.3 * max(known), ceiling))
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        highest = max(J for _, _, J in told if J is not None and ceiling >= J)
+        axes.set_ylim(min(known) / 1.5, min(1.3 * highest, ceiling))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     axes.set_xlim(0, max(len(trials), len(baseline or [])) + 2)
     axes.set_xlabel("trial")
     axes.set_ylabel("cost J")

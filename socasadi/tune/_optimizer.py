@@ -337,7 +337,7 @@ class Optimizer:
             rivals = np.vstack([belief.data.points[kept], likely])
             return cost, cost.predict(rivals)[0].min(axis=0)
         best = belief.data.targets[kept].min()
-        if self._repeat and len(self.trials) % 2:
+        if self._acquisition.alternating and len(self.trials) % 2:
             best = belief.cost.predict(belief.data.points[kept])[0].min()
         if not len(waiting):
             return belief.cost, np.array([best])

@@ -6,7 +6,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from socasadi.campaign import Campaign, Flight, Journal, Result, assess
+from socasadi.campaign import Campaign, Flight, Journal, MeasuredLimit, Result, RunError, assess
 from socasadi.plant import PlantFailure
 
 
@@ -107,3 +107,32 @@ def test_a_controller_whose_J_was_told_alone_is_exported_with_an_episode_on_its_
     assert len(record.output) == 200
     result.export(tmp_path / "c")
     assert (tmp_path / "c" / "controller.h").exists()
+
+
+def test_what_breaks_a_limit_when_it_is_flown_again_is_not_what_is_exported(toy_study, tmp_path):
+    calls = []
+
+    def luck(episode, mpc):
+        """The search's trials keep the limit; of the flights beside it, those of the best observed do not."""
+        calls.append(1)
+        return float(episode.output[1, 0] == broken[0]) if broken else 0.0
+
+    broken = []
+    noisy = replace(toy_study, plant=type(toy_study.plant)(noise=0.02), verifications=1)
+    study = replace(noisy, limits=(MeasuredLimit("luck", "1", 0.5, luck),))
+    result = study.run(tmp_path / "run", progress=None)
+    verdicts = assess(result).verdicts
+    assert verdicts["best"].broken == 0
+    (flight,) = [f for name, f in result.flights().items() if name.startswith("best ") and "estimated" not in name]
+    broken.append(flight.episode.output[1, 0])
+    again = Result(study, result.folder)
+    assert assess(again).verdicts["best"].broken == 1
+    if "best estimated" in verdicts:
+        assert again.chosen.theta.tolist() == verdicts["best estimated"].theta.tolist()
+
+
+def test_a_limit_that_nothing_keeps_is_named_with_how_near_it_came(toy_study, tmp_path):
+    study = replace(toy_study, limits=(MeasuredLimit("load", "N", -1.0, lambda episode, mpc: 2.0),), iterations=0)
+    result = study.run(tmp_path / "run", progress=None)
+    with pytest.raises(RunError, match=r"none of the 6 trials .* load was 2 N at least, above its limit of -1"):
+        _ = result.best

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import qmc
 from tune_support import BRANIN, BRANIN_MINIMUM, branin, cube, repeats, run, sphere, told
 
-from socasadi.tune import Optimizer
+from socasadi.tune import Optimizer, SobolSearch
 
 
 def quadratic(theta):
@@ -58,13 +58,11 @@ def test_without_noise_the_best_estimated_is_the_best_observed_and_sure():
     assert estimate.high - estimate.low < 0.02
 
 
-def test_one_trial_alone_is_its_own_estimate():
-    search = Optimizer(cube(2))
-    assert search.best_estimated is None
-    search.tell([0.2, 0.2], 3.0)
-    estimate = search.best_estimated
-    assert (estimate.index, estimate.cost) == (0, 3.0)
-    assert estimate.low <= 3.0 <= estimate.high
+def test_one_trial_alone_says_nothing_of_its_noise_and_neither_do_space_filling_points():
+    for search in (Optimizer(cube(2)), SobolSearch(cube(2))):
+        assert search.best_estimated is None
+        search.tell([0.2, 0.2], 3.0)
+        assert search.best_estimated is None
 
 
 def test_a_search_under_noise_comes_nearer_than_the_noise_is_large():

@@ -33,11 +33,15 @@ class Acquisition:
         The merit is the logarithm of something positive.
     noisy : bool
         It is to be averaged over what the noise may have hidden at the points already told.
+    alternating : bool
+        At every other ask the best to improve on is the lowest cost believed at a told point, not the lowest observed.
+        The lower of the two explores, the other refines what is there, and neither does better on all costs.
     """
 
     function: Callable[[NDArray, NDArray, NDArray | float], Partials]
     logarithm: bool = True
     noisy: bool = False
+    alternating: bool = False
 
 
 def expected_improvement(mean: NDArray, std: NDArray, best: NDArray | float) -> Partials:
@@ -102,7 +106,7 @@ def confidence_bound(mean: NDArray, std: NDArray, best: NDArray | float) -> Part
 
 
 ACQUISITIONS: dict[str, Acquisition] = {
-    "log_ei": Acquisition(log_expected_improvement),
+    "log_ei": Acquisition(log_expected_improvement, alternating=True),
     "ei": Acquisition(expected_improvement, logarithm=False),
     "noisy_ei": Acquisition(log_expected_improvement, noisy=True),
     "ucb": Acquisition(confidence_bound),
