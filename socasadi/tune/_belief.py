@@ -29,7 +29,6 @@ from .surrogate import (
 _EXACT = 1e-6
 _SIDE = 1.645  # deviations of a normal distribution between which 90 % lie
 
-
 # By so much the logarithm of another way's evidence has to be above the first's: several ways are tried, and each is
 # fitted to the same costs.
 _PREFERENCE = 6.0
