@@ -126,11 +126,14 @@ def tell(
     anyway: Annotated[
         bool, typer.Option("--anyway", help="Take a recording whose inputs are not the controller's.")
     ] = False,
+    take_back: Annotated[
+        bool, typer.Option("--take-back", help="Instead: what was told of it was wrong; it is out again.")
+    ] = False,
     script: StudyScript = None,
 ) -> None:
-    """Bring the result of a trial that was flown by hand or by another program."""
-    if sum(outcome is not None for outcome in (recording, cost, failed)) != 1:
-        raise RunError("tell takes exactly one of --csv FILE, --cost J and --failed REASON")
+    """Bring the result of a trial that was flown by hand or by another program, or take it back."""
+    if sum(outcome is not None for outcome in (recording, cost, failed)) + take_back != 1:
+        raise RunError("tell takes exactly one of --csv FILE, --cost J, --failed REASON and --take-back")
     if measured and cost is None:
         raise RunError("--measured goes with --cost; from a recording it is computed")
     if failed is not None and not failed.strip():
@@ -138,6 +141,9 @@ def tell(
     values = _measured(measured or [])
     with _campaign(folder, script) as campaign:
         before = campaign.best
+        if take_back:
+            _print_taken_back(campaign, campaign.take_back(trial))
+            return
         if recording is None:
             told = campaign.tell(trial, cost=cost, failed=failed, measured=values or None)
         else:
@@ -161,8 +167,8 @@ def _recorded(campaign: Campaign, number: int, path: Path, anyway: bool) -> Epis
     if share > _DOUBTFUL and not anyway:
         raise RunError(
             f"trial {number}'s controller would have answered the outputs in {path} by other inputs: they differ by "
-            f"{100 * share:.0f} % of the bound (root mean square), so another one flew, or a column is wrong; what is "
-            "told cannot be taken back, so tell it with --anyway if you are sure"
+            f"{100 * share:.0f} % of the bound (root mean square), so another one flew, or a column is wrong; tell it "
+            "with --anyway if you are sure"
         )
     return episode
 
@@ -245,13 +251,9 @@ def _print_pending(result: Result, as_json: bool) -> None:
 def _print_told(campaign: Campaign, told: Trial, before: Trial | None) -> None:
     study, score = campaign.study, told.score
     factor, unit = distance(study)
-    match told.outcome:
-        case "failed":
-            line = f"failed: {told.failure}"
-        case "cut":
-            line = f"cut: J is at least {told.at_least:.5g}; {told.saved_seconds or 0:g} s were spared"
-        case "done":
-            line = f"J = {told.J:.5g}"
+    line = _outcome(told)
+    if told.outcome == "cut":
+        line += f"; {told.saved_seconds or 0:g} s were spared"
     if score is not None:
         line += f" (tracking {score.tracking:.4g}, input {score.effort:.4g}), RMSE {factor * score.rmse:.3f} {unit}"
     for limit in study.limits:
@@ -273,6 +275,23 @@ def _print_told(campaign: Campaign, told: Trial, before: Trial | None) -> None:
     else:
         following = f"nothing but to wait for trial {numbers}"
     out.print(f"next        {following}")
+
+
+def _print_taken_back(campaign: Campaign, trial: Trial) -> None:
+    folder = _quoted(campaign.folder)
+    out.print(f"{f'trial {trial.number}':11} was told as {_outcome(trial)}; that is taken back", markup=False)
+    out.print(f"run         {_left(len(campaign.trials), len(campaign.pending), campaign.study)}")
+    out.print(f"next        socasadi tell {folder} --trial {trial.number} --csv recording.csv")
+
+
+def _outcome(trial: Trial) -> str:
+    match trial.outcome:
+        case "failed":
+            return f"failed: {trial.failure}"
+        case "cut":
+            return f"cut: J is at least {trial.at_least:.5g}"
+        case "done":
+            return f"J = {trial.J:.5g}"
 
 
 def _left(told: int, pending: int, study: Study) -> str:

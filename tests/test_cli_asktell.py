@@ -394,7 +394,7 @@ def test_a_robot_that_python_never_touches_cannot_be_run(at_the_bench, socasadi)
         (("init", "study.py", "--real", "half", "--out", "x"), "unknown real 'half'; there are double, float"),
         (("tell", "runs/study", "--trial", 2, "--cost", 3), "trial 2 of runs/study was never asked; not told yet: 1"),
         (("tell", "runs/study", "--trial", 1, "--cost", "nan"), "nan"),
-        (("tell", "runs/study", "--trial", 1), "exactly one of --csv FILE, --cost J and --failed REASON"),
+        (("tell", "runs/study", "--trial", 1), "exactly one of --csv FILE, --cost J, --failed REASON and --take-back"),
         (("tell", "runs/study", "--trial", 1, "--cost", 3, "--csv", "a.csv"), "exactly one of --csv FILE, --cost J"),
         (("tell", "runs/study", "--trial", 1, "--csv", "nowhere.csv"), "there is no recording nowhere.csv"),
         (("tell", "runs/study", "--trial", 1, "--csv", "."), "directory"),
@@ -420,3 +420,16 @@ def test_what_was_told_is_not_told_again(at_the_bench, socasadi):
     socasadi("tell", "runs/study", "--trial", 1, "--cost", 5)
     said = socasadi("tell", "runs/study", "--trial", 1, "--cost", 4, refused=True)
     assert "trial 1 of runs/study was told already" in said
+
+
+def test_what_was_told_wrong_is_taken_back_and_told_anew(at_the_bench, socasadi):
+    socasadi("init", "study.py")
+    asked(socasadi)
+    socasadi("tell", "runs/study", "--trial", 1, "--cost", 0.5)
+    both = ("--cost", 5, "--take-back")
+    assert "exactly one of" in socasadi("tell", "runs/study", "--trial", 1, *both, refused=True)
+    said = socasadi("tell", "runs/study", "--trial", 1, "--take-back")
+    assert "trial 1     was told as J = 0.5; that is taken back" in said
+    assert "0 of 6 trials told, 1 out, 5 to be asked" in said
+    assert "best        J = 5, trial 1" in socasadi("tell", "runs/study", "--trial", 1, "--cost", 5)
+    assert "nothing was told of trial 2" in socasadi("tell", "runs/study", "--trial", 2, "--take-back", refused=True)

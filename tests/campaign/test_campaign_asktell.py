@@ -21,6 +21,10 @@ def flown(study, asked):
     return fly(study.plant, controller, study.task, **settings)
 
 
+def tell_next(campaign, cost):
+    return campaign.tell(campaign.ask().number, cost=cost)
+
+
 def test_asked_and_told_one_by_one_from_reopened_folders_it_is_the_run_that_flies_itself(toy_study, tmp_path):
     study = replace(toy_study, task=Circle(duration=1.0, period=2.0), iterations=3)
     run = study.run(tmp_path / "run", progress=None)
@@ -55,6 +59,59 @@ def test_what_is_out_is_reckoned_with_and_comes_back_the_same(toy_study, tmp_pat
             assert out.theta.tolist() == before.theta.tolist()
             assert (out.give_up, out.asked, out.started) == (before.give_up, before.asked, before.started)
         assert campaign.ask().number == 4
+
+
+class TestTakingBack:
+    """A wrong number was told: the trial is out again, and the search goes on as if it had never heard of it."""
+
+    def test_told_anew_it_is_the_campaign_that_was_never_told_wrong(self, toy_study, tmp_path):
+        with Campaign(toy_study, tmp_path / "right") as campaign:
+            right = [tell_next(campaign, 5.0 + number) for number in range(8)]
+            expected = campaign.ask().theta
+        with Campaign(toy_study, tmp_path / "wrong") as campaign:
+            for number in range(7):
+                tell_next(campaign, 5.0 + number)
+            last = tell_next(campaign, 0.001)
+            assert campaign.best is last
+            assert campaign.take_back(8).J == 0.001
+            assert campaign.best.number == 1
+            assert [out.number for out in campaign.pending] == [8]
+            assert campaign.pending[0].theta.tolist() == right[-1].theta.tolist()
+        with Campaign(toy_study, tmp_path / "wrong", resume=True) as campaign:
+            assert [out.number for out in campaign.pending] == [8]
+            campaign.tell(8, cost=12.0)
+            assert campaign.ask().theta.tolist() == expected.tolist()
+
+    def test_the_journal_keeps_what_was_told_and_when(self, toy_study, tmp_path):
+        with Campaign(toy_study, tmp_path / "run") as campaign:
+            one, two = campaign.ask(), campaign.ask()
+            campaign.tell(1, episode=flown(toy_study, one))
+            wrong = campaign.take_back(1)
+            campaign.tell(two.number, cost=3.0)
+            again = campaign.tell(1, cost=4.0)
+        with Journal(tmp_path / "run" / "journal.sqlite") as journal:
+            ((event, kept),) = journal.taken_back()
+            assert (event, kept.told, again.told) == (4, 3, 6)
+            assert (kept.J, kept.score, kept.theta.tolist()) == (wrong.J, wrong.score, wrong.theta.tolist())
+            assert [trial.J for trial in journal.trials()] == [3.0, 4.0]
+            assert journal.episode(1) is None
+
+    def test_a_trial_that_a_run_flew_is_flown_again_by_the_next(self, toy_study, tmp_path):
+        study = replace(toy_study, iterations=0)
+        before = study.run(tmp_path / "run", progress=None)
+        with Campaign(study, tmp_path / "run", resume=True) as campaign:
+            campaign.take_back(3)
+            assert not campaign.complete
+        after = study.run(tmp_path / "run", resume=True, progress=None)
+        assert {trial.number: trial.J for trial in after.trials} == {trial.number: trial.J for trial in before.trials}
+
+    def test_what_was_not_told_cannot_be_taken_back(self, toy_study, tmp_path):
+        with Campaign(toy_study, tmp_path / "run") as campaign:
+            tell_next(campaign, 5.0)
+            campaign.ask()
+            for number in (0, 2, 3):
+                with pytest.raises(RunError, match=f"nothing was told of trial {number} of .*; told: 1"):
+                    campaign.take_back(number)
 
 
 def test_an_ask_is_stored_before_it_is_handed_out(toy_study, tmp_path):

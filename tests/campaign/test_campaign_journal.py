@@ -141,7 +141,7 @@ class TestDamage:
         replace(toy_study, iterations=0).run(tmp_path / "run", progress=None)
         with sqlite3.connect(tmp_path / "run" / "journal.sqlite") as database:
             database.execute("UPDATE about SET schema = 1")
-        with pytest.raises(JournalError, match="schema version 1, this socasadi reads version 2: read it with the soc"):
+        with pytest.raises(JournalError, match="schema version 1, this socasadi reads version 3: read it with the soc"):
             toy_study.run(tmp_path / "run", resume=True, progress=None)
 
     @pytest.mark.parametrize("lost", ["empty", "missing"])
@@ -188,10 +188,12 @@ def test_any_sqlite_reads_it_and_its_schema_explains_it(toy_study, tmp_path):
         for (number, theta, outcome, J, at_least, give_up), trial in zip(rows, result.trials, strict=True):
             assert (number, json.loads(theta), J) == (trial.number, trial.theta.tolist(), trial.J)
             assert (outcome == "cut") == (at_least is not None and at_least > give_up)
-        (schema,) = database.execute("SELECT sql FROM sqlite_master WHERE name = 'trial'").fetchone()
-    columns = [line for line in schema.splitlines()[1:] if not line.startswith(")")]
-    assert len(columns) > 15
-    assert all("-- " in line for line in columns)
+        query = "SELECT sql FROM sqlite_master WHERE name IN ('trial', 'taken_back')"
+        schemas = [schema for (schema,) in database.execute(query)]
+    for schema in schemas:
+        columns = [line for line in schema.splitlines()[1:] if not line.startswith(")")]
+        assert len(columns) > 15
+        assert all("-- " in line for line in columns)
 
 
 def test_asks_and_tells_are_counted_together_in_the_order_in_which_they_happened(toy_study, tmp_path):

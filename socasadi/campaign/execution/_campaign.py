@@ -4,6 +4,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ...tune import Timings
 from ..experiment import Episode
 from ..store import (
     Asked,
@@ -101,6 +102,7 @@ class Campaign:
         try:
             self._trials, pending = self._journal.trials(), self._journal.pending()
             self._pending = {asked.number: asked for asked in pending}
+            self._taken_back = len(self._journal.taken_back())
             self._search = replayed(study.optimizer(), self._trials)
         except BaseException:
             self.close()
@@ -232,6 +234,29 @@ class Campaign:
         self._trials.append(trial)
         return trial
 
+    def take_back(self, number: int) -> Trial:
+        """Let trial ``number`` be out again, as if nothing had been told of it, and return it as it was told.
+
+        The journal keeps what was told. What was asked since stays as it is: it was asked in the belief of it.
+
+        Raises
+        ------
+        RunError
+            Nothing was told of that trial.
+        """
+        trial = next((trial for trial in self._trials if trial.number == number), None)
+        if trial is None:
+            told = ", ".join(str(trial.number) for trial in self._trials) or "none"
+            raise RunError(f"nothing was told of trial {number} of {self.folder}; told: {told}")
+        asked = Asked(**{name: getattr(trial, name) for name in Asked.__dataclass_fields__})
+        asked = replace(asked, seconds={name: trial.seconds.get(name, 0.0) for name in asdict(Timings())})
+        self._journal.take_back(asked, self._events() + 1)
+        self._taken_back += 1
+        self._trials.remove(trial)
+        self._pending = dict(sorted((self._pending | {number: asked}).items()))
+        self._search = replayed(self.study.optimizer(), self._trials)
+        return trial
+
     def _asked(self, number: int) -> Asked:
         if (asked := self._pending.get(number)) is None:
             told = any(trial.number == number for trial in self._trials)
@@ -250,4 +275,4 @@ class Campaign:
             )
 
     def _events(self) -> int:
-        return 2 * len(self._trials) + len(self._pending)
+        return 2 * (len(self._trials) + self._taken_back) + len(self._pending)

@@ -123,9 +123,18 @@ class Journal:
         """Store the outcome of a trial that was asked, and its record."""
         row = trial_row(trial, episode)
         with self._writing():
+            self._update(row)
+
+    def take_back(self, asked: Asked, event: int) -> None:
+        """Let a trial that was told be out again, as ``asked``; what was told of it is kept aside with this event."""
+        columns = ", ".join((*TRIAL_COLUMNS, "episode"))
+        row = trial_row(asked)
+        with self._writing():
             self._database.execute(
-                f"UPDATE trial SET {', '.join(f'{name} = :{name}' for name in row)} WHERE number = :number", row
+                f"INSERT INTO taken_back (event, {columns}) SELECT {event}, {columns} FROM trial WHERE number = ?",
+                (asked.number,),
             )
+            self._update(row)
 
     def add_flight(self, flight: Flight) -> None:
         """Store a flight beside the search."""
@@ -155,6 +164,12 @@ class Journal:
             raise KeyError(f"{self.path} has no trial {number}")
         return episode
 
+    def taken_back(self) -> list[tuple[int, Trial]]:
+        """Everything that was told and taken back: the event, and the trial as it was told."""
+        with self._reading():
+            query = f"SELECT event, {', '.join(TRIAL_COLUMNS)} FROM taken_back ORDER BY event"
+            return [(row[0], _told(trial_of(row[1:]))) for row in self._database.execute(query)]
+
     def flights(self) -> dict[str, Flight]:
         """All flights beside the search, by name."""
         with self._reading():
@@ -164,15 +179,22 @@ class Journal:
 
     def _rows(self) -> list[Asked]:
         """All trials in the order of asking: a :class:`Trial` for those that were told."""
+        taken_back = self.taken_back()
         with self._reading():
             query = f"SELECT {', '.join(TRIAL_COLUMNS)} FROM trial ORDER BY number"
             rows = [trial_of(values) for values in self._database.execute(query)]
             events = [row.asked for row in rows]
             in_order = events == sorted(events) and [row.number for row in rows] == list(range(1, len(rows) + 1))
             events += [row.told for row in rows if isinstance(row, Trial)]
+            events += [event for at, trial in taken_back for event in (at, trial.told)]
             if not in_order or sorted(events) != list(range(1, len(events) + 1)):
                 raise ValueError("trials are missing from their row")
         return rows
+
+    def _update(self, row: Mapping[str, Any]) -> None:
+        self._database.execute(
+            f"UPDATE trial SET {', '.join(f'{name} = :{name}' for name in row)} WHERE number = :number", row
+        )
 
     def _insert(self, table: str, row: Mapping[str, Any]) -> None:
         with self._writing():
@@ -202,6 +224,12 @@ class Journal:
         return JournalError(
             f"{self.path} cannot be written ({error}); what was stored before is safe: mend that, and resume"
         )
+
+
+def _told(trial: Asked) -> Trial:
+    if not isinstance(trial, Trial):
+        raise ValueError(f"trial {trial.number} was taken back without having been told")
+    return trial
 
 
 def _make(path: Path) -> None:

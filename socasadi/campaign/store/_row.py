@@ -11,16 +11,13 @@ from ..experiment import Episode, Score
 from ._pack import pack, unpack
 from ._trial import Asked, Flight, Trial
 
-SCHEMA = 2
+SCHEMA = 3
 
-TABLES = """
-CREATE TABLE about (schema INTEGER NOT NULL);
-CREATE TABLE trial (
-    number INTEGER PRIMARY KEY,  -- from 1, in the order of asking
+_TRIAL = """
     phase TEXT NOT NULL,         -- 'seed' or 'search'
     theta TEXT NOT NULL,         -- JSON list, in the order of the prediction model's entries
     by_hand INTEGER NOT NULL,    -- 1: asked for somebody who flies and tells it, so that a run does not fly it
-    asked INTEGER NOT NULL,      -- event: asks and tells are counted together, from 1, in the order they happened
+    asked INTEGER NOT NULL,      -- event: asks, tells and takings back are counted together, from 1, as they happened
     told INTEGER,                -- event; NULL while nothing was told
     outcome TEXT,                -- 'done', 'failed' or 'cut'; NULL while nothing was told
     J REAL,                      -- cost of a trial that is done
@@ -34,8 +31,17 @@ CREATE TABLE trial (
     plant_seconds REAL,          -- s of the robot's time that were flown
     saved_seconds REAL,          -- s of the robot's time that were not, because the trial was cut
     record_checksum INTEGER,     -- CRC-32 of the record
-    checksum INTEGER NOT NULL,   -- CRC-32 of all the columns above
-    episode BLOB                 -- the record: a compressed .npz archive
+    checksum INTEGER NOT NULL,   -- CRC-32 of all the columns from number on
+    episode BLOB                 -- the record: a compressed .npz archive"""
+
+TABLES = f"""
+CREATE TABLE about (schema INTEGER NOT NULL);
+CREATE TABLE trial (
+    number INTEGER PRIMARY KEY,  -- from 1, in the order of asking{_TRIAL}
+);
+CREATE TABLE taken_back (        -- what was told of a trial and taken back, so that it was out again
+    event INTEGER PRIMARY KEY,   -- of the taking back
+    number INTEGER NOT NULL,     -- of the trial{_TRIAL}
 );
 CREATE TABLE flight (            -- experiments beside the search
     name TEXT PRIMARY KEY,
