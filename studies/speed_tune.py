@@ -7,8 +7,8 @@
 All get the same ten seed points, those of a Sobol sequence scrambled by the number of the repetition, and then ask for
 one point at a time; all search the unit cube (studies/peers/tune_search.py). Four functions whose minimum is known and
 three searches of this package, whose J carries the noise of the sensor, another in every evaluation. A finished run is
-kept at once, in the folder --out: the command can be stopped and given again, goes on with what is missing, and every
-repetition is finished for all before the next is begun.
+kept at once, in the folder --out (studies/results/tune holds those of the page): the command can be stopped and given
+again, goes on with what is missing, and every repetition is finished for all before the next is begun.
 """
 
 import argparse
@@ -32,7 +32,8 @@ from threadpoolctl import threadpool_limits
 PROBLEMS = {problem.name: problem for problem in (*FUNCTIONS, *STUDIES, *EXTRA)}
 OURS, OWN = "socasadi", ("socasadi", "paper")
 INSTANTS = (30, 50, 100)
-FIGURE = Path(__file__).parent / "figures" / "tune-regret.png"
+HERE = Path(__file__).parent
+FIGURE, RESULTS = HERE / "figures" / "tune-regret.png", HERE / "results" / "tune"
 
 Job = tuple[str, str, int, int]
 
@@ -46,7 +47,7 @@ def main() -> None:
     parser.add_argument("--dear", type=int, default=10, help="repetitions on the tuning problems (10)")
     parser.add_argument("--evaluations", type=int, default=100, help="of each run, with the ten seed points (100)")
     parser.add_argument("--jobs", type=int, default=1, help="processes (1)")
-    parser.add_argument("--out", type=Path, default=Path("runs/speed_tune"), help="folder of the finished runs")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the finished runs")
     parser.add_argument("--report", action="store_true", help="run nothing, only report")
     parser.add_argument("--figure", action="store_true", help=f"also draw {FIGURE.name}")
     chosen = parser.parse_args()
@@ -66,7 +67,7 @@ def main() -> None:
     if not tables:
         raise SystemExit(f"{chosen.out} has no finished run of {chosen.evaluations} evaluations of these")
     instants = [instant for instant in INSTANTS if instant <= chosen.evaluations] or [chosen.evaluations]
-    report(tables, instants, chosen.evaluations)
+    report(tables, instants)
     if chosen.figure:
         from peers.tune_figure import draw
 
@@ -104,8 +105,8 @@ def run(results: Results, methods: Sequence[str], counts: dict[str, int], evalua
             print(f"{head} failed: {str(done)[:200]}", file=sys.stderr, flush=True)
             continue
         results.add(done)
-        last = "nothing but failures" if done.best[-1] is None else f"{done.best[-1]:.5g}"
-        print(f"{head} {last}, {done.failures} failures, {sum(done.seconds):.1f} s of CPU", flush=True)
+        last = f"{done.best[-1][1]:.5g}" if done.best else "nothing but failures"
+        print(f"{head} {last}, {done.failures} failures, {done.seconds:.2f} s of CPU an ask", flush=True)
 
 
 def carried_out(wanted: Sequence[Job], jobs: int) -> Iterator[tuple[Job, Run | Exception]]:
@@ -130,7 +131,7 @@ def carry_out(job: Job) -> Run | Exception:
         return RuntimeError(f"{type(error).__name__}: {error}")
 
 
-def report(tables: Sequence[Table], instants: Sequence[int], evaluations: int) -> None:
+def report(tables: Sequence[Table], instants: Sequence[int]) -> None:
     tested = any(OURS in table.costs for table in tables)
     if tested:
         print(
@@ -138,7 +139,7 @@ def report(tables: Sequence[Table], instants: Sequence[int], evaluations: int) -
         )
     for table in tables:
         regrets(table, instants)
-    processor(tables, evaluations)
+    processor(tables)
     if tested:
         summary(tables, instants)
 
@@ -165,9 +166,9 @@ def regrets(table: Table, instants: Sequence[int]) -> None:
         print(line)
 
 
-def processor(tables: Sequence[Table], evaluations: int) -> None:
+def processor(tables: Sequence[Table]) -> None:
     width = max(len(table.problem.title) for table in tables) + 2
-    print(f"\nCPU seconds an iteration, mean of iterations {SEED_POINTS + 1} to {evaluations}, median of the runs")
+    print("\nCPU seconds of an ask and its tell, mean of a run after its seed points, median of the runs")
     methods = [name for name in METHODS if any(name in table.costs for table in tables)]
     print(" " * width + "".join(f"{METHODS[name].title:>23}" for name in methods))
     for table in tables:

@@ -58,9 +58,8 @@ class Table:
         self.seconds: dict[str, list[float]] = {}
         for run in runs:
             if run.problem == problem.name:
-                costs = [np.inf if cost is None else cost for cost in run.best[:evaluations]]
-                self.costs.setdefault(run.method, {})[run.repetition] = np.array(costs)
-                self.seconds.setdefault(run.method, []).append(float(np.mean(run.seconds[SEED_POINTS:evaluations])))
+                self.costs.setdefault(run.method, {})[run.repetition] = run.curve(evaluations)
+                self.seconds.setdefault(run.method, []).append(run.seconds)
         lowest = min((costs.min() for done in self.costs.values() for costs in done.values()), default=np.nan)
         self.least = float(lowest) if problem.least is None else problem.least
         self.costs = {method: done for method, done in self.costs.items() if method in methods}

@@ -26,11 +26,13 @@ class Run:
     ----------
     problem, method, repetition
         Which.
+    evaluations
+        How many, with the seed points.
     best
-        The lowest cost after 1, 2, ... evaluations (of a problem with a known truth: the truth of that point); None
-        while all have failed.
+        Each evaluation that was better than all before it, counted from 1, with its cost (of a problem with a known
+        truth: the truth of that point).
     seconds
-        CPU time of each evaluation's ask and tell, s; 0 at the seed points.
+        CPU time of an ask and its tell, s, the mean of those after the seed points.
     failures
         Evaluations that failed.
     theta
@@ -42,8 +44,9 @@ class Run:
     problem: str
     method: str
     repetition: int
-    best: list[float | None]
-    seconds: list[float]
+    evaluations: int
+    best: list[tuple[int, float]]
+    seconds: float
     failures: int
     theta: list[float]
     versions: dict[str, str]
@@ -51,6 +54,13 @@ class Run:
     @property
     def key(self) -> tuple[str, str, int]:
         return self.problem, self.method, self.repetition
+
+    def curve(self, evaluations: int) -> np.ndarray:
+        """The best cost after 1, 2, ... evaluations; infinity while all have failed."""
+        curve = np.full(evaluations, np.inf)
+        for number, cost in self.best:
+            curve[number - 1 :] = cost
+        return curve
 
 
 def search(problem: Problem, method: Method, repetition: int, evaluations: int) -> Run:
@@ -63,7 +73,7 @@ def search(problem: Problem, method: Method, repetition: int, evaluations: int) 
     seeds = seed_points(space, repetition, evaluations)
     optimiser = method.make(space, repetition, evaluations)
     waiting: list[np.ndarray] = []
-    lowest, worst, judged, theta, failures = np.inf, -np.inf, None, np.zeros(0), 0
+    lowest, worst, theta, failures = np.inf, -np.inf, np.zeros(0), 0
     best, seconds = [], []
     for number in range(evaluations):
         begin = time.process_time()
@@ -80,6 +90,7 @@ def search(problem: Problem, method: Method, repetition: int, evaluations: int) 
             if cost < lowest:
                 lowest, theta = cost, at
                 judged = cost if problem.truth is None else problem.truth(at)
+                best.append((number + 1, short(judged)))
         begin = time.process_time()
         if np.isfinite(worst):
             for point in waiting:
@@ -88,9 +99,24 @@ def search(problem: Problem, method: Method, repetition: int, evaluations: int) 
         if cost is not None:
             optimiser.tell(unit, scaled(cost, method), False)
             told += 1
-        seconds.append(round(spent + time.process_time() - begin, 4) if asked else 0.0)
-        best.append(judged)
-    return Run(problem.name, method.name, repetition, best, seconds, failures, theta.tolist(), method.versions)
+        if asked:
+            seconds.append(spent + time.process_time() - begin)
+    return Run(
+        problem=problem.name,
+        method=method.name,
+        repetition=repetition,
+        evaluations=evaluations,
+        best=best,
+        seconds=round(float(np.mean(seconds)), 4) if seconds else 0.0,
+        failures=failures,
+        theta=[short(value) for value in theta.tolist()],
+        versions=method.versions,
+    )
+
+
+def short(value: float) -> float:
+    """To ten digits: files of runs are kept with the studies."""
+    return float(f"{value:.10g}")
 
 
 def scaled(cost: float, method: Method) -> float:
@@ -132,5 +158,5 @@ class Results:
 
     def finished(self, evaluations: int) -> dict[tuple[str, str, int], Run]:
         """The runs of at least so many evaluations, by problem, method and repetition."""
-        longest_last = sorted(self, key=lambda run: len(run.best))
-        return {run.key: run for run in longest_last if len(run.best) >= evaluations}
+        longest_last = sorted(self, key=lambda run: run.evaluations)
+        return {run.key: run for run in longest_last if run.evaluations >= evaluations}
