@@ -1,13 +1,17 @@
 """Trials on a real Dask cluster: processes that talk over TCP on this machine."""
 
+import json
 import os
 import signal
+import subprocess
+import sys
+import time
 
 import pytest
 from test_campaign_parallel import outcomes, script
 
 from socasadi.campaign import RunError, dask_executor, load_study
-from socasadi.campaign.execution import _loop
+from socasadi.campaign.execution import _dask, _loop
 
 distributed = pytest.importorskip("distributed", reason="the package distributed is not installed")
 __all__ = ["script"]
@@ -63,17 +67,46 @@ def test_a_worker_that_hangs_is_ended_and_its_trial_has_failed(script, tmp_path,
     assert len(before - workers(cluster)) == 1
 
 
-def test_a_scheduler_that_is_not_there_is_said(monkeypatch):
-    from socasadi.campaign.execution import _dask
+def test_a_scheduler_that_dies_ends_the_run_in_a_sentence_and_resuming_finishes_it(script, tmp_path, monkeypatch):
+    monkeypatch.setattr(_dask, "_PATIENCE", 5.0)
+    file = script("time.sleep(0.01)")
+    study, scheduler = load_study(file), tmp_path / "scheduler.json"
+    started = [
+        subprocess.Popen([sys.executable, "-m", f"distributed.cli.dask_{role}", *arguments], stderr=subprocess.DEVNULL)
+        for role, arguments in (
+            ("scheduler", ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", scheduler]),
+            ("worker", ["--scheduler-file", scheduler, "--no-dashboard", "--nthreads", "1"]),
+        )
+    ]
 
+    def kill(progress):
+        if progress.done == 4:
+            started[0].kill()
+
+    try:
+        deadline = time.monotonic() + 60
+        while not scheduler.exists() and time.monotonic() < deadline:
+            time.sleep(0.1)
+        with (
+            dask_executor(json.loads(scheduler.read_text())["address"]) as executor,
+            pytest.raises(RunError, match=r"takes no more trials .*its scheduler is gone.*what was told is stored"),
+        ):
+            study.run(tmp_path / "run", executor=executor, script=file, progress=kill)
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+    again = study.run(tmp_path / "run", resume=True, progress=None)
+    assert outcomes(again) == outcomes(study.run(tmp_path / "alone", progress=None))
+
+
+def test_a_scheduler_that_is_not_there_is_said(monkeypatch):
     monkeypatch.setattr(_dask, "_PATIENCE", 1.0)
     with pytest.raises(RunError, match=r"no Dask cluster with a worker answers at tcp://127\.0\.0\.1:1: "):
         dask_executor("tcp://127.0.0.1:1")
 
 
 def test_without_the_package_its_name_is_said(monkeypatch):
-    import sys
-
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(RunError, match=r"pip install 'socasadi\[distributed\]'"):
         dask_executor("tcp://127.0.0.1:1")

@@ -1,13 +1,14 @@
 """Trials on a Dask cluster."""
 
 import re
+import time
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future
 from typing import Any
 
 from ..store import RunError
 
-# s to wait for the scheduler, for a first worker, and for one that starts again.
+# s to wait for the scheduler, also when the way to it was lost, for a first worker, and for one that starts again.
 _PATIENCE = 30.0
 
 
@@ -24,11 +25,26 @@ class DaskExecutor(Executor):
         return max(1, sum(self._client.nthreads().values()))
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future:
-        """Have ``fn`` done by the cluster, which does it again itself when a worker dies."""
+        """Have ``fn`` done by the cluster, which does it again itself when a worker dies.
+
+        Raises
+        ------
+        BrokenExecutor
+            The scheduler is gone.
+        """
+        deadline = time.monotonic() + _PATIENCE
+        while not self._connected and self._client.status == "connecting" and time.monotonic() < deadline:
+            time.sleep(0.1)
+        if not self._connected:
+            raise BrokenExecutor("its scheduler is gone")
         future: Future = Future()
         self._tasks[future] = task = self._client.submit(fn, *args, pure=False, **kwargs)
         task.add_done_callback(lambda task: self._pass_on(task, future))
         return future
+
+    @property
+    def _connected(self) -> bool:
+        return self._client.status == "running"
 
     def _pass_on(self, task: Any, future: Future) -> None:
         self._tasks.pop(future, None)
@@ -42,9 +58,11 @@ class DaskExecutor(Executor):
             future.set_exception(BrokenExecutor(f"the cluster has {task.status} it"))
 
     def abandon(self, future: Future) -> bool:
-        """Start the worker again that is busy with ``future``; False when it has no nanny to do so."""
+        """Start the worker again that is busy with ``future``; False without a nanny to do so, or a scheduler."""
         if (task := self._tasks.pop(future, None)) is None:
             return True
+        if not self._connected:
+            return False
         busy = [worker for worker, keys in self._client.processing().items() if task.key in keys]
         task.cancel()
         try:
