@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.special import ndtr
 
 from ._search import Estimate, Trial, keeps_limits
 from ._space import Space
@@ -19,7 +21,9 @@ from .surrogate import (
     classify,
     condition,
     cost_data,
+    draw,
     evidence,
+    fit,
     plain_data,
     surrogate,
     transform_named,
@@ -27,7 +31,9 @@ from .surrogate import (
 
 # A value drawn at a told point is exact; so much of the variance keeps the matrix regular.
 _EXACT = 1e-6
-_SIDE = 1.645  # deviations of a normal distribution between which 90 % lie
+
+# Hyperparameters that an estimate averages over.
+_DRAWN = 16
 
 # By so much the logarithm of another way's evidence has to be above the first's: several ways are tried, and each is
 # fitted to the same costs.
@@ -36,6 +42,12 @@ _PREFERENCE = 6.0
 # So many trials, and each multiple of the period after them, get a full fit; between, the descent starts at its result.
 _ALL_FULL = 30
 _PERIOD = 5
+
+
+# Processes of several kinds take turns, two asks each, for they are not wrong in the same places: bold or not, with the
+# kernel's sum or not. Every other one is the kind that predicts best where nothing is known of the cost; costs that are
+# nearly sums, or whose parameters have scales of their own, are found by the others.
+_ROTA = ((False, False), (True, False), (False, False), (False, True))
 
 
 def last_full_fit(told: int) -> int:
@@ -81,8 +93,12 @@ class Believer:
         rng = np.random.default_rng([self.seed, len(trials), 0])
         hyper = None if start is None else start.hyperparameters
         data = self._data(trials, units, way)
-        data, cost = surrogate(data, self.settings, rng, hyper, _seen_noise(trials, data))
+        data, cost = surrogate(data, self._settings(trials), rng, hyper, _seen_noise(trials, data))
         return data, cost, Start(way, cost.hyperparameters)
+
+    def _settings(self, trials: Sequence[Trial]) -> FitSettings:
+        bold, sums = _ROTA[len(trials) // 2 % len(_ROTA)]
+        return replace(self.settings, bold=bold, additive=self.settings.additive and sums)
 
     def _data(self, trials: Sequence[Trial], units: NDArray, way: int) -> Data:
         data = cost_data(trials, units, self.transform, way)
@@ -99,7 +115,8 @@ class Believer:
         for way in range(ways):
             data = self._data(trials, units, way)
             data = data.subset(~data.bound)
-            scores.append(evidence(data.points, data.targets, self.settings, data.known) + data.log_slopes.sum())
+            likely = evidence(data.points, data.targets, self._settings(trials), data.known)
+            scores.append(likely + data.log_slopes.sum())
         scores[0] += _PREFERENCE
         return int(np.argmax(scores))
 
@@ -115,6 +132,27 @@ class Believer:
             failure = classify(units[rows], failed[rows], self.settings.kernel)
         limited = [self._limited(name, trials, units) for name in self.limits]
         return Belief(trials, units, data, cost, found, failure, limited)
+
+    def estimate(self, belief: Belief, keep: Callable[[Trial], bool]) -> Estimate:
+        """The trial of least expected cost among those with that property.
+
+        Reckons with what the trials leave open of the hyperparameters, of the noise above all: the fitted ones alone
+        would be too sure.
+        """
+        data, rows = belief.data, belief.rows_that(keep)
+        rng = np.random.default_rng([self.seed, len(belief.trials), 4])
+        settings = replace(self.settings, additive=False)
+        about = data.points, data.targets, settings, rng, data.known
+        least = _seen_noise(belief.trials, data)
+        drawn = draw(*about, fit(*about, None, least), _DRAWN, least)
+        told = [condition(one, data.points, data.targets[:, None], one.noise + data.known) for one in drawn]
+        means, deviations = zip(*(process.predict(data.points[rows]) for process in told), strict=True)
+        means = np.hstack(means)
+        best = int(means.mean(axis=1).argmin())
+        chances = _quantiles(means[best], np.array(deviations)[:, best], (0.05, 0.5, 0.95))
+        low, middle, high = data.restore(chances).tolist()
+        index = int(data.rows[rows[best]])
+        return Estimate(index, belief.trials[index].theta, middle, low, high)
 
     def _limited(self, name: str, trials: Sequence[Trial], units: NDArray) -> tuple[Posterior, float]:
         rows = [i for i, trial in enumerate(trials) if name in trial.measured]
@@ -154,25 +192,9 @@ class Belief:
     failure: Posterior | None
     limited: list[tuple[Posterior, float]]
 
-    @property
-    def noisy(self) -> bool:
-        """Whether the cost may have noise: a point told twice with one and the same cost says that it has none."""
-        costs = _repeated(self.trials)
-        return not any(np.ptp(told) <= 1e-10 * np.abs(told).max() for told in costs)
-
     def rows_that(self, keep: Callable[[Trial], bool]) -> NDArray:
         """Indices into the data of the trials with that property."""
         return np.array([i for i, row in enumerate(self.data.rows) if keep(self.trials[row])], dtype=int)
-
-    def estimate(self, keep: Callable[[Trial], bool]) -> Estimate:
-        """The trial of least expected cost among those with that property."""
-        rows = self.rows_that(keep)
-        mean, std = self.cost.predict(self.data.points[rows])
-        least = int(mean[:, 0].argmin())
-        index = int(self.data.rows[rows[least]])
-        middle, spread = float(mean[least, 0]), _SIDE * float(std[least])
-        cost, low, high = self.data.restore(np.array([middle, middle - spread, middle + spread]))
-        return Estimate(index, self.trials[index].theta, float(cost), float(low), float(high))
 
     def imagined(self, points: NDArray, worlds: int, rng: np.random.Generator) -> Posterior:
         """The cost's process in worlds where costs were observed at further points (m, d), drawn from it."""
@@ -191,7 +213,22 @@ class Belief:
         """The cost's process in worlds where the costs without noise are known, at the told and at further points."""
         known = np.vstack([self.cost.points, points]) if len(points) else self.cost.points
         drawn = self.cost.sample(known, worlds, rng)
-        return condition(self.cost.hyperparameters, known, drawn, _EXACT * self.cost.hyperparameters.variance)
+        return condition(self.cost.hyperparameters, known, drawn, _EXACT * self.cost.hyperparameters.prior)
+
+
+def is_exact(trials: Sequence[Trial]) -> bool:
+    """Whether the cost has no noise: a point that was told twice had one and the same."""
+    return any(np.ptp(told) <= 1e-10 * np.abs(told).max() for told in _repeated(trials))
+
+
+def _quantiles(means: NDArray, deviations: NDArray, levels: Sequence[float]) -> NDArray:
+    """Quantiles of a mixture of normal distributions in equal parts."""
+    ends = means + 9 * np.outer((-1, 1), deviations)
+
+    def excess(x: float, level: float) -> float:
+        return float(ndtr((x - means) / deviations).mean()) - level
+
+    return np.array([brentq(excess, ends.min(), ends.max(), args=(level,)) for level in levels])
 
 
 def _repeated(trials: Sequence[Trial]) -> list[NDArray]:

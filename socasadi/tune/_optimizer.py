@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
-from ._belief import Belief, Believer, Start, last_full_fit
+from ._belief import Belief, Believer, Start, is_exact, last_full_fit
 from ._search import Estimate, History, Timings, Trial, check_seed, keeps_limits
 from ._sobol import SobolPoints
 from ._space import Space
@@ -56,8 +56,11 @@ class Optimizer:
         the worse half little more than the order. Logarithm and "box-cox" need J > 0.
     mean : {"constant", "zero"}
         Learned constant, or zero, of the standardised targets.
+    additive : bool
+        At two asks of eight: beside the kernel of all coordinates a sum of one-dimensional ones (Duvenaud et al. 2011).
     priors : bool
-        Lengthscale priors scaled with sqrt(d) (Hvarfner et al. 2024) on top of the marginal likelihood.
+        On top of the marginal likelihood: lengthscales scaled with sqrt(d) (Hvarfner et al. 2024), and, except at two
+        asks of eight, lengthscales akin to each other and some noise.
     noise : "fitted" or float
         Fitted, or the fixed variance of the observation noise on the scale of the standardised targets. Deviations
         that are told with the trials come on top.
@@ -100,6 +103,7 @@ class Optimizer:
         acquisition: str = "log_ei",
         transform: str = "power",
         mean: str = "constant",
+        additive: bool = True,
         priors: bool = True,
         noise: float | Literal["fitted"] = "fitted",
         warp: bool = False,
@@ -117,7 +121,7 @@ class Optimizer:
         self._believer = Believer(
             space,
             self._transform,
-            FitSettings(kernel, mean, priors, None if noise == "fitted" else noise, warp),
+            FitSettings(kernel, mean, additive, priors, None if noise == "fitted" else noise, warp),
             self._history.limits,
             _count("active_set", active_set),
             self._seed,
@@ -149,6 +153,7 @@ class Optimizer:
             acquisition="ei",
             transform="none",
             mean="zero",
+            additive=False,
             priors=False,
             noise=0.01**2,
             repeat=False,
@@ -178,7 +183,8 @@ class Optimizer:
         """
         if self.best is None or sum(trial.cost is not None for trial in self.trials) < 2:
             return None
-        return self._believe().estimate(self._keeps_limits)
+        with threadpool_limits(1):
+            return self._believer.estimate(self._believe(), self._keeps_limits)
 
     @property
     def timings(self) -> Timings:
@@ -189,13 +195,13 @@ class Optimizer:
     def hyperparameters(self) -> dict[str, float]:
         """The last fit's hyperparameters as plain numbers, for a log; empty before the first fit.
 
-        Lengthscales are in the unit cube, under "lengthscale:NAME"; mean, variance and noise (a variance)
-        refer to the standardised targets.
+        Lengthscales are in the unit cube, under "lengthscale:NAME"; mean, variance, additive (the variance of the sum
+        of one-dimensional kernels) and noise (a variance) refer to the standardised targets.
         """
         if self._belief is None:
             return {}
         hyper = self._belief.cost.hyperparameters
-        named = {"mean": hyper.mean, "variance": hyper.variance, "noise": hyper.noise}
+        named = {name: getattr(hyper, name) for name in ("mean", "variance", "additive", "noise")}
         for name, value in zip(self.space.names, hyper.lengthscales, strict=True):
             named[f"lengthscale:{name}"] = float(value)
         return named
@@ -313,7 +319,7 @@ class Optimizer:
             merit = Merit(self._acquisition, None, np.zeros(1), constraints)
         incumbents = belief.data.points[order[:_INCUMBENTS]]
         taken = np.vstack([belief.units, waiting])
-        if may_repeat := self._repeat and len(kept) and not len(waiting) and belief.noisy:
+        if may_repeat := self._repeat and len(kept) and not len(waiting) and not is_exact(self.trials):
             theta = self.trials[belief.data.rows[order[0]]].theta
             if _is_time_to_repeat(len(self.trials)) and self._may_ask(theta):
                 return theta

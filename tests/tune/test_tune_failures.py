@@ -61,17 +61,19 @@ def test_while_all_trials_fail_it_keeps_exploring():
     assert search.best.cost == 0.1
 
 
-def test_after_a_few_successes_among_failures_it_stays_where_experiments_succeed():
+def test_after_a_few_successes_among_failures_it_goes_on_to_succeed_and_to_improve():
     # A disc of 7 % of the box; the first three start points lie in it.
     def fails(theta):
         return bool(np.linalg.norm(theta - [0.7, 0.3]) > 0.15)
 
     start = [[0.7, 0.3], [0.65, 0.33], [0.72, 0.22]]
-    search = Optimizer(cube(2), seed=0, seed_points=8, initial=start)
-    run(search, lambda theta: 1.0 + float(theta[0] + theta[1]), 20, fails)
-    asked = search.trials[8:]
-    assert sum(not trial.failed for trial in asked) >= 3  # one of 12 at random
-    assert search.best.cost < 1.91  # 1.788 at the disc's best, 1.94 at the best of the first three
+    successes = 0
+    for seed in range(4):
+        search = Optimizer(cube(2), seed=seed, seed_points=8, initial=start)
+        run(search, lambda theta: 1.0 + float(theta[0] + theta[1]), 20, fails)
+        successes += sum(not trial.failed for trial in search.trials[8:])
+        assert search.best.cost < 1.93  # 1.788 at the disc's best, 1.94 at the best of the first three
+    assert successes >= 6  # 3.4 of 48 at random
 
 
 def test_only_the_first_trials_succeed_and_it_goes_on_asking_new_points():

@@ -2,10 +2,11 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import beta, lognorm, multivariate_normal
+from scipy.stats import beta, multivariate_normal, norm
 from tune_support import differences
 
 from socasadi.tune.surrogate import FitSettings, condition, evidence, fit
@@ -40,9 +41,11 @@ def gpy_model(hyper, points, values, kernel):
     import GPy
 
     d = points.shape[1]
-    kern = {"rbf": GPy.kern.RBF, "matern52": GPy.kern.Matern52}[kernel](
-        d, variance=hyper.variance, lengthscale=hyper.lengthscales, ARD=True
-    )
+    of = {"rbf": GPy.kern.RBF, "matern52": GPy.kern.Matern52}[kernel]
+    kern = of(d, variance=hyper.variance, lengthscale=hyper.lengthscales, ARD=True)
+    if hyper.additive:
+        for i, lengthscale in enumerate(hyper.lengthscales / np.sqrt(d)):
+            kern = kern + of(1, variance=hyper.additive / d, lengthscale=lengthscale, active_dims=[i])
     likelihood = GPy.likelihoods.Gaussian(variance=hyper.noise)
     mean = GPy.mappings.Constant(d, 1, value=hyper.mean)
     return GPy.core.GP(points, values[:, None], kern, likelihood, mean_function=mean)
@@ -50,10 +53,12 @@ def gpy_model(hyper, points, values, kernel):
 
 @pytest.mark.parametrize("kernel", ["rbf", "matern52"])
 @pytest.mark.parametrize("mean", ["constant", "zero"])
-def test_closed_form_prediction_and_gradients_agree_with_gpy(kernel, mean):
+@pytest.mark.parametrize("additive", [False, True])
+def test_closed_form_prediction_and_gradients_agree_with_gpy(kernel, mean, additive):
     points, values = data()
     values = values + 0.1 * np.random.default_rng(1).standard_normal(len(values))
-    posterior = fitted(points, values, FitSettings(kernel, mean, **QUICK))
+    posterior = fitted(points, values, FitSettings(kernel, mean, additive, **QUICK))
+    assert (posterior.hyperparameters.additive > 0) == additive
     model = gpy_model(posterior.hyperparameters, points, values, kernel)
     x = np.random.default_rng(2).random((20, 4))
     expected_mean, expected_variance = model.predict_noiseless(x)
@@ -84,10 +89,15 @@ def test_prediction_and_gradient_hold_at_a_data_point(kernel):
 
 
 def covariance_of(hyper, kernel, x, z):
-    """Rasmussen and Williams 2006, eqs. 4.9 and 4.17."""
-    r = np.linalg.norm((x[:, None] - z[None]) / hyper.lengthscales, axis=2)
-    s = np.sqrt(5) * r
-    return hyper.variance * (np.exp(-0.5 * r**2) if kernel == "rbf" else (1 + s + s**2 / 3) * np.exp(-s))
+    """Rasmussen and Williams 2006, eqs. 4.9 and 4.17, of all coordinates and of each."""
+
+    def of(r):
+        s = np.sqrt(5) * r
+        return np.exp(-0.5 * r**2) if kernel == "rbf" else (1 + s + s**2 / 3) * np.exp(-s)
+
+    apart = (x[:, None] - z[None]) / hyper.lengthscales
+    each = of(np.sqrt(x.shape[1]) * np.abs(apart)).mean(axis=2)
+    return hyper.variance * of(np.linalg.norm(apart, axis=2)) + hyper.additive * each
 
 
 @pytest.mark.parametrize("kernel", ["rbf", "matern52"])
@@ -102,7 +112,7 @@ def test_noise_of_each_point_and_several_worlds_are_textbook_regression(kernel):
     k = covariance_of(hyper, kernel, x, points)
     mean, std = posterior.predict(x)
     np.testing.assert_allclose(mean, hyper.mean + k @ np.linalg.solve(K, worlds - hyper.mean), atol=1e-7)
-    variance = hyper.variance - np.einsum("ij,ji->i", k, np.linalg.solve(K, k.T))
+    variance = hyper.variance + hyper.additive - np.einsum("ij,ji->i", k, np.linalg.solve(K, k.T))
     np.testing.assert_allclose(std**2, variance, atol=1e-7)
 
 
@@ -159,41 +169,45 @@ def test_warping_straightens_a_function_that_is_steep_at_one_face():
     assert error(True) < 0.7 * error(False)
 
 
-def log_posterior(points, values, kernel, mean, variance, lengthscales, noise, priors):
-    """Marginal likelihood from scipy's multivariate normal, and BoTorch's documented lengthscale prior."""
-    r = np.linalg.norm((points[:, None] - points[None]) / lengthscales, axis=2)
-    s = np.sqrt(5) * r
-    k = np.exp(-0.5 * r**2) if kernel == "rbf" else (1 + s + s**2 / 3) * np.exp(-s)
-    covariance = variance * k + (noise + 1e-8) * np.eye(len(points))
-    value = multivariate_normal.logpdf(values, np.full(len(values), mean), covariance)
-    if priors:
-        scale = np.exp(np.sqrt(2) + 0.5 * np.log(points.shape[1]))
-        value += lognorm.logpdf(lengthscales, s=np.sqrt(3), scale=scale).sum()
+def log_posterior(points, values, known, hyper, settings):
+    """Marginal likelihood from scipy's multivariate normal, and the priors."""
+    noise = known + hyper.noise + 1e-8
+    covariance = covariance_of(hyper, settings.kernel, points, points) + np.diag(noise)
+    value = multivariate_normal.logpdf(values, np.full(len(values), hyper.mean), covariance)
+    if not settings.priors:
+        return value
+    # Lengthscales are log-normal; where the priors are not bold, they are less likely the more they are apart.
+    d, logs = len(hyper.lengthscales), np.log(hyper.lengthscales)
+    precision = np.eye(d) / 3 + (not settings.bold) * (np.eye(d) - np.ones((d, d)) / d) / 0.5**2
+    centre = np.full(d, np.sqrt(2) + 0.5 * np.log(d))
+    value += multivariate_normal.logpdf(logs, centre, np.linalg.inv(precision)) - logs.sum()
+    if settings.noise is None and not settings.bold:
+        value += norm.logpdf(np.log(hyper.noise), np.log(1e-2), 3)
+    if settings.additive:
+        value += norm.logpdf(np.log(hyper.additive / hyper.variance), 0, 2)
     return value
 
 
 @pytest.mark.parametrize("kernel", ["rbf", "matern52"])
 @pytest.mark.parametrize("mean", ["constant", "zero"])
+@pytest.mark.parametrize("additive", [False, True])
 @pytest.mark.parametrize("noise", [None, 0.02])
-@pytest.mark.parametrize("priors", [False, True])
-def test_the_evidence_is_the_density_of_the_data_and_has_its_gradient(kernel, mean, noise, priors):
+@pytest.mark.parametrize(("priors", "bold"), [(False, False), (True, False), (True, True)])
+def test_the_evidence_is_the_density_of_the_data_and_has_its_gradient(kernel, mean, additive, noise, priors, bold):
     points, values = data(15, 2)
     known = np.random.default_rng(5).uniform(0.0, 0.2, 15)
-    settings = FitSettings(kernel, mean, priors, noise)
+    settings = FitSettings(kernel, mean, additive, priors, noise, bold=bold)
     loss = Loss(points, values, known, settings)
+    constants = []
     for z in np.random.default_rng(6).uniform(-1.0, 0.5, (3, len(loss.bounds))):
         value, gradient = loss(z)
         np.testing.assert_allclose(gradient, differences(lambda at: loss(at)[0], z, 1e-4), rtol=1e-5, atol=1e-5)
         hyper = loss.hyperparameters(z)
-        covariance = covariance_of(hyper, kernel, points, points) + np.diag(known + hyper.noise + 1e-8)
-        expected = -multivariate_normal.logpdf(values, np.full(15, hyper.mean), covariance)
-        if priors:
-            # Up to what does not depend on the hyperparameters.
-            scale = np.exp(np.sqrt(2) + 0.5 * np.log(2))
-            constant = 2 * (np.log(np.sqrt(3)) + 0.5 * np.log(2 * np.pi))
-            expected -= lognorm.logpdf(hyper.lengthscales, s=np.sqrt(3), scale=scale).sum() + constant
-        assert value == pytest.approx(expected, rel=1e-7)
+        constants.append(value + log_posterior(points, values, known, hyper, settings))
         np.testing.assert_allclose(loss.position(hyper), z, atol=1e-12)
+    # Up to what does not depend on the hyperparameters.
+    np.testing.assert_allclose(constants, constants[0], atol=1e-6)
+    assert priors or abs(constants[0]) < 1e-6
 
 
 @pytest.mark.parametrize("kernel", ["rbf", "matern52"])
@@ -205,34 +219,61 @@ def test_the_evidence_of_a_warping_has_its_gradient(kernel):
         np.testing.assert_allclose(gradient, differences(lambda at: loss(at)[0], z, 1e-4), rtol=1e-5, atol=1e-5)
 
 
-@pytest.mark.parametrize(("kernel", "priors"), [("rbf", False), ("matern52", True)])
-def test_no_other_hyperparameters_are_more_likely(kernel, priors):
+@pytest.mark.parametrize(
+    ("kernel", "additive", "priors", "bold"),
+    [("rbf", False, False, False), ("matern52", False, True, True), ("matern52", True, True, False)],
+)
+def test_no_other_hyperparameters_are_more_likely(kernel, additive, priors, bold):
     points, values = data(30, 3)
     values = standardised(values + 0.2 * np.random.default_rng(3).standard_normal(30))
-    hyper = fit(points, values, FitSettings(kernel, priors=priors), np.random.default_rng(0))
-    found = np.array([hyper.mean, hyper.variance, *hyper.lengthscales, hyper.noise])
-
-    def at(h):
-        return log_posterior(points, values, kernel, h[0], h[1], h[2:5], h[5], priors)
-
-    rng = np.random.default_rng(4)
-    best = at(found)
+    settings, known = FitSettings(kernel, additive=additive, priors=priors, bold=bold), np.zeros(30)
+    found = fit(points, values, settings, np.random.default_rng(0))
+    rng, best = np.random.default_rng(4), log_posterior(points, values, known, found, settings)
     for size in (0.01, 0.1, 1.0):
         for _ in range(60):
-            change = size * rng.standard_normal(6)
-            other = np.array([found[0] + change[0], *(found[1:] * np.exp(change[1:]))])
-            other[2:5] = np.minimum(other[2:5], 1e3)
-            assert at(other) <= best + 1e-3
+            other = replace(
+                found,
+                mean=found.mean + size * rng.standard_normal(),
+                variance=found.variance * np.exp(size * rng.standard_normal()),
+                additive=found.additive * np.exp(size * rng.standard_normal()),
+                noise=found.noise * np.exp(size * rng.standard_normal()),
+                lengthscales=np.minimum(found.lengthscales * np.exp(size * rng.standard_normal(3)), 1e3),
+            )
+            assert log_posterior(points, values, known, other, settings) <= best + 1e-3
 
 
 def test_an_irrelevant_dimension_gets_a_long_lengthscale():
     points, values = data(40, 4)
     for kernel in ("rbf", "matern52"):
         for priors in (True, False):
-            settings = FitSettings(kernel, priors=priors, **QUICK)
+            settings = FitSettings(kernel, additive=False, priors=priors, **QUICK)
             scales = fit(points, values, settings, np.random.default_rng(0)).lengthscales
             assert scales[0] < scales[1] < scales[2:].min()
             assert scales[2:].min() > 3 * scales[0]
+
+
+def test_priors_that_are_not_bold_leave_less_of_the_lengthscales_of_few_data_to_chance():
+    """Of a cost that is alike in all of ten coordinates."""
+    points = np.random.default_rng(2).random((25, 10))
+    values = standardised(np.sqrt(((points - 0.4) ** 2).sum(axis=1)))
+    spreads = []
+    for bold in (True, False):
+        found = fit(points, values, FitSettings(bold=bold, **QUICK), np.random.default_rng(0))
+        spreads.append(np.log(found.lengthscales).std())
+    assert spreads[1] < 0.3 * spreads[0]
+
+
+def test_a_sum_of_ten_functions_is_learnt_from_few_data():
+    """Each of one coordinate: what a kernel of all coordinates does not know."""
+    points = np.random.default_rng(2).random((140, 10))
+    values = standardised(np.cos(9 * points).sum(axis=1))
+    shares = []
+    for additive in (False, True):
+        posterior = fitted(points[:60], values[:60], FitSettings(additive=additive, **QUICK))
+        missed = posterior.predict(points[60:])[0][:, 0] - values[60:]
+        shares.append(np.mean(missed**2) / values[60:].var())
+    assert shares[1] < 0.2 < 0.6 < shares[0]
+    assert posterior.hyperparameters.additive > posterior.hyperparameters.variance
 
 
 def test_fitted_noise_is_the_noise_that_was_added():
@@ -243,7 +284,7 @@ def test_fitted_noise_is_the_noise_that_was_added():
 
 
 def test_fixed_noise_stays_fixed_and_zero_mean_stays_zero():
-    hyper = fit(*data(), FitSettings("rbf", "zero", False, 1e-4), np.random.default_rng(0))
+    hyper = fit(*data(), FitSettings("rbf", "zero", priors=False, noise=1e-4), np.random.default_rng(0))
     assert hyper.noise == pytest.approx(1e-4, rel=1e-12)
     assert hyper.mean == 0.0
 

@@ -18,7 +18,7 @@ ACQUISITIONS = ("ei", "log_ei", "noisy_ei", "ucb")
 
 def process(seed, worlds=1, kernel="matern52", warp=None, noise=1e-3):
     rng = np.random.default_rng(seed)
-    hyper = Hyperparameters(kernel, 0.2, 1.3, noise, rng.uniform(0.3, 0.9, D), warp)
+    hyper = Hyperparameters(kernel, 0.2, 1.3, noise, rng.uniform(0.3, 0.9, D), seed % 2 * 0.7, warp)
     return condition(hyper, POINTS, rng.normal(size=(N, worlds)), noise)
 
 

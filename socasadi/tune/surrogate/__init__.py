@@ -3,7 +3,7 @@
 from ._data import Data, cost_data, plain_data, surrogate
 from ._evidence import import_gpy
 from ._feasibility import classify
-from ._fit import FitSettings, evidence, fit
+from ._fit import FitSettings, draw, evidence, fit
 from ._posterior import Hyperparameters, Posterior, condition
 from ._transform import Scale, Transform, transform_named
 
@@ -17,6 +17,7 @@ __all__ = [
     "classify",
     "condition",
     "cost_data",
+    "draw",
     "evidence",
     "fit",
     "import_gpy",

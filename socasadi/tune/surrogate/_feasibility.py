@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ._evidence import KernelMatrix, descend, import_gpy, kernel_bounds, lengthscale_penalty
+from ._evidence import KernelMatrix, descend, import_gpy, kernel_bounds
 from ._posterior import Hyperparameters, Posterior
+from ._prior import lengthscale_penalty
 
 _START_VARIANCE = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """What GPy asks of a kernel: its matrix, which is known, and whether it has a derivative."""
+
+    matrix: NDArray
+    size: int = 1
+    is_fixed: bool = False
+
+    def K(self, points: NDArray) -> NDArray:
+        return self.matrix
 
 
 class _Loss:
@@ -17,15 +32,13 @@ class _Loss:
     def __init__(self, points: NDArray, failed: NDArray, kernel: str) -> None:
         gpy = import_gpy()
         self.points, self.labels = points, failed.astype(float)[:, None]
-        self.matrix = KernelMatrix(kernel, points.shape[1])
+        self.matrix = KernelMatrix(kernel, points)
         self.likelihood = gpy.likelihoods.Bernoulli()
         self.inference = gpy.inference.latent_function_inference.Laplace()
 
     def infer(self, z: NDArray) -> tuple[object, float, dict[str, NDArray]]:
-        self.matrix.set(z)
-        posterior, evidence, by = self.inference.inference(
-            self.matrix.kernel, self.points, self.likelihood, self.labels
-        )
+        kernel = _Given(self.matrix(z))
+        posterior, evidence, by = self.inference.inference(kernel, self.points, self.likelihood, self.labels)
         return posterior, float(np.squeeze(evidence)), by
 
     def __call__(self, z: NDArray) -> tuple[float, NDArray]:
@@ -33,7 +46,7 @@ class _Loss:
             _, evidence, by = self.infer(z)
         except np.linalg.LinAlgError:
             return 1e10, np.zeros_like(z)
-        gradient = -self.matrix.gradient(by["dL_dK"], self.points)
+        gradient = -self.matrix.gradient(by["dL_dK"])
         penalty, slope = lengthscale_penalty(z[1:])
         gradient[1:] += slope
         return penalty - evidence, gradient

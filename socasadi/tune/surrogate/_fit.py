@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._named import choose
-from ._evidence import KernelMatrix, descend, import_gpy, kernel_bounds, lengthscale_penalty
+from ._evidence import KernelMatrix, descend, import_gpy, kernel_bounds
 from ._kernel import kernel_named
 from ._posterior import Hyperparameters
+from ._prior import balance_penalty, lengthscale_penalty, noise_penalty
+from ._sample import slice_sample
 from ._warp import BOUNDS as WARP_BOUNDS
 from ._warp import PRIOR_DEVIATION, Warp
 
@@ -24,16 +28,20 @@ NOISE_BOUNDS = (1e-6, 1.0)
 class FitSettings:
     """What is fitted, and how.
 
-    `noise` is None (fitted) or a fixed variance on the standardised scale; `priors` puts lengthscale priors scaled
-    with sqrt(d) on top of the likelihood, without them it is pure maximum likelihood; `warp` fits a warping of the
-    inputs, too; of `screened` random starts the best `restarts` are optimised, beside the fixed start.
+    `noise` is None (fitted) or a fixed variance on the standardised scale; `additive` gives the kernel a sum of
+    one-dimensional ones beside that of all coordinates; `priors` puts those of `_prior.py` on top of the likelihood,
+    without them it is pure maximum likelihood; `bold` ones leave the lengthscales and the noise to the data; `warp`
+    fits a warping of the inputs, too; of `screened` random starts the best `restarts` are optimised, beside the fixed
+    start.
     """
 
     kernel: str = "matern52"
     mean: str = "constant"
+    additive: bool = True
     priors: bool = True
     noise: float | None = None
     warp: bool = False
+    bold: bool = False
     screened: int = 60
     restarts: int = 4
 
@@ -48,7 +56,9 @@ class FitSettings:
 
 
 class Loss:
-    """Minus the log posterior density of z = [mean], log variance, log lengthscales, [log noise], [log a, log b].
+    """Minus the log posterior density of z.
+
+    z holds [mean], the logarithms of variance, lengthscales, [the sum's variance], [noise], [a, b of the warping].
 
     Parameters
     ----------
@@ -67,26 +77,29 @@ class Loss:
         self.inference = gpy.inference.latent_function_inference.ExactGaussianInference()
         self.likelihood = gpy.likelihoods.Gaussian()
         d = points.shape[1]
-        self.matrix = KernelMatrix(settings.kernel, d)
+        self.matrix = KernelMatrix(settings.kernel, points, settings.additive)
         means, free, warped = MEANS[settings.mean], settings.noise is None, 2 * d * settings.warp
         self.mean = slice(0, means)
-        self.kernel = slice(means, means + 1 + d)
+        self.kernel = slice(means, means + 1 + d + settings.additive)
         self.lengthscales = slice(means + 1, means + 1 + d)
+        self.sum = slice(self.lengthscales.stop, self.kernel.stop)
         self.noise = slice(self.kernel.stop, self.kernel.stop + free)
         self.warp = slice(self.noise.stop, self.noise.stop + warped)
-        blocks = [MEAN_BOUNDS] * means, kernel_bounds(d), [np.log(NOISE_BOUNDS)] * free, [WARP_BOUNDS] * warped
-        self.bounds = np.vstack([np.reshape(block, (-1, 2)) for block in blocks])
+        blocks = [MEAN_BOUNDS] * means, [np.log(NOISE_BOUNDS)] * free, [WARP_BOUNDS] * warped
+        before, *after = (np.reshape(block, (-1, 2)) for block in blocks)
+        self.bounds = np.vstack([before, kernel_bounds(d, settings.additive), *after])
 
     def __call__(self, z: NDArray) -> tuple[float, NDArray]:
-        hyper = self.hyperparameters(z)
-        points = self.points if hyper.warp is None else hyper.warp(self.points)
-        self.matrix.set(z[self.kernel])
+        hyper, matrix = self.hyperparameters(z), self.matrix
+        if hyper.warp is not None:
+            matrix = KernelMatrix(self.settings.kernel, hyper.warp(self.points), self.settings.additive)
         try:
             _, evidence, by = self.inference.inference(
-                self.matrix.kernel,
-                points,
+                None,
+                self.points,
                 self.likelihood,
                 (self.targets - hyper.mean)[:, None],
+                K=matrix(z[self.kernel]),
                 variance=hyper.noise + self.known,
             )
         except np.linalg.LinAlgError:
@@ -94,20 +107,36 @@ class Loss:
         gradient = np.zeros_like(z)
         by_K = by["dL_dK"]
         gradient[self.mean] = -by["dL_dm"].sum()
-        gradient[self.kernel] = -self.matrix.gradient(by_K, points)
+        gradient[self.kernel] = -matrix.gradient(by_K)
         gradient[self.noise] = -np.trace(by_K) * hyper.noise
         value = -float(np.squeeze(evidence))
         if hyper.warp is not None:
-            by_points = self.matrix.gradient_of_points(by_K, points)
+            by_points = matrix.gradient_of_points(by_K)
             gradient[self.warp] = -np.concatenate(
                 [(by_points * by).sum(axis=0) for by in hyper.warp.by_logs(self.points)]
             )
             value += 0.5 * float(z[self.warp] @ z[self.warp]) / PRIOR_DEVIATION**2
             gradient[self.warp] += z[self.warp] / PRIOR_DEVIATION**2
         if self.settings.priors:
-            penalty, slope = lengthscale_penalty(z[self.lengthscales])
+            penalty, slopes = self._penalty(z)
             value += penalty
-            gradient[self.lengthscales] += slope
+            gradient += slopes
+        return value, gradient
+
+    def _penalty(self, z: NDArray) -> tuple[float, NDArray]:
+        """Minus the logarithm of the priors' density, with its gradient."""
+        value, gradient = 0.0, np.zeros_like(z)
+        priors: list[tuple[slice, Callable[[NDArray], tuple[float, NDArray]]]] = [
+            (self.lengthscales, functools.partial(lengthscale_penalty, akin=not self.settings.bold))
+        ]
+        if self.settings.noise is None and not self.settings.bold:
+            priors.append((self.noise, noise_penalty))
+        if self.settings.additive:
+            priors.append((slice(self.kernel.start, self.kernel.stop), balance_penalty))
+        for part, prior in priors:
+            penalty, slope = prior(z[part])
+            value += penalty
+            gradient[part] += slope
         return value, gradient
 
     def hyperparameters(self, z: NDArray) -> Hyperparameters:
@@ -119,6 +148,7 @@ class Loss:
             variance=float(np.exp(z[self.kernel][0])),
             noise=float(np.exp(z[self.noise][0])) if fixed is None else fixed,
             lengthscales=np.exp(z[self.lengthscales]),
+            additive=float(np.exp(z[self.sum][0])) if self.settings.additive else 0.0,
             warp=Warp(*np.exp(z[self.warp]).reshape(2, -1)) if self.settings.warp else None,
         )
 
@@ -126,7 +156,9 @@ class Loss:
         """The z that stands for them."""
         z = np.zeros(len(self.bounds))
         z[self.mean] = hyper.mean
-        z[self.kernel] = np.log([hyper.variance, *hyper.lengthscales])
+        z[self.kernel.start] = np.log(hyper.variance)
+        z[self.lengthscales] = np.log(hyper.lengthscales)
+        z[self.sum] = np.log(hyper.additive or hyper.variance)
         z[self.noise] = np.log(hyper.noise)
         if hyper.warp is not None:
             z[self.warp] = np.log([*hyper.warp.a, *hyper.warp.b])
@@ -136,6 +168,7 @@ class Loss:
     def start(self) -> NDArray:
         """The start that all fits have."""
         z = np.zeros(len(self.bounds))
+        z[[self.kernel.start, *range(len(z))[self.sum]]] = -np.log(1 + self.settings.additive)
         z[self.lengthscales] = 0.5 * np.log(self.points.shape[1])
         z[self.noise] = np.log(1e-2)
         return z
@@ -187,6 +220,31 @@ def fit(
     loss.bounds[loss.noise, 0] = np.log(np.clip(least_noise, *NOISE_BOUNDS))
     starts = loss.starts(rng) if start is None else [loss.position(start)]
     return loss.hyperparameters(descend(loss, starts, loss.bounds))
+
+
+def draw(
+    points: NDArray,
+    targets: NDArray,
+    settings: FitSettings,
+    rng: np.random.Generator,
+    known: NDArray,
+    start: Hyperparameters,
+    count: int,
+    least_noise: float = 0.0,
+) -> list[Hyperparameters]:
+    """Return `count` hyperparameters drawn from their distribution given the data, beginning at `start`, the fitted.
+
+    Parameters as of `fit`.
+    """
+    loss = _loss(points, targets, settings, known)
+    loss.bounds[loss.noise, 0] = np.log(np.clip(least_noise, *NOISE_BOUNDS))
+
+    def log_density(z: NDArray) -> float:
+        # Priors are densities of the lengthscales themselves, the space that is sampled is that of their logarithms.
+        return (float(z[loss.lengthscales].sum()) if settings.priors else 0.0) - loss(z)[0]
+
+    drawn = slice_sample(log_density, loss.position(start), loss.bounds, count, rng)
+    return [loss.hyperparameters(z) for z in drawn]
 
 
 def evidence(points: NDArray, targets: NDArray, settings: FitSettings, known: NDArray | None = None) -> float:

@@ -1,23 +1,24 @@
-"""Stationary kernels with one lengthscale a dimension: values, gradients, and GPy's class of each."""
+"""Kernels: of all coordinates at once, and beside it a sum of those of each coordinate.
+
+    k(x, z) = v s(r^2) + w/d sum_i s(d r_i^2),    r_i = (x_i - z_i) / l_i,    r^2 = sum_i r_i^2
+
+The sum (Duvenaud, Nickisch and Rasmussen 2011, "Additive Gaussian processes") lets what was seen of a coordinate hold
+wherever the others are, which a process of ten and more coordinates otherwise takes hundreds of data to see. The factor
+d keeps both parts' lengthscales alike: points drawn at random are d times as far apart as their coordinates.
+"""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 
 from .._named import choose
 
-
-class Shape(Protocol):
-    """The kernel of unit variance as a function of the squared scaled distance r^2."""
-
-    def __call__(self, squared: NDArray) -> tuple[NDArray, NDArray]:
-        """Return k(r) and its slope -(dk/dr) / r, finite at r = 0; both of the shape of `squared`."""
-        ...
+Shape = Callable[[NDArray], tuple[NDArray, NDArray]]
+"""A stationary kernel of unit variance: of r^2 the value s and -(ds/dr) / r, finite at r = 0."""
 
 
 def rbf(squared: NDArray) -> tuple[NDArray, NDArray]:
@@ -33,29 +34,33 @@ def matern52(squared: NDArray) -> tuple[NDArray, NDArray]:
     return (1.0 + s + s * s / 3.0) * decay, 5.0 / 3.0 * (1.0 + s) * decay
 
 
-@dataclass(frozen=True)
-class Kernel:
-    """A kernel: its shape here, and the name of its class in GPy.kern.
-
-    A further one is a `Kernel` added to `KERNELS`: any stationary class of GPy with `variance` and `lengthscale`.
-    """
-
-    shape: Shape
-    gpy: str
+KERNELS: dict[str, Shape] = {"matern52": matern52, "rbf": rbf}
 
 
-KERNELS: dict[str, Kernel] = {"matern52": Kernel(matern52, "Matern52"), "rbf": Kernel(rbf, "RBF")}
-
-
-def kernel_named(name: str) -> Kernel:
-    """Return the kernel of that name; ValueError lists the known ones."""
+def kernel_named(name: str) -> Shape:
+    """Return the shape of that name; ValueError lists the known ones."""
     return choose("kernel", KERNELS, name)
 
 
-def lengthscale_prior(dimension: int) -> tuple[float, float]:
-    """Mean and deviation of log lengthscale in the unit cube, scaled with sqrt(d).
+def kernel_parts(shape: Shape, apart: NDArray, variance: float, additive: float) -> tuple[NDArray, NDArray, NDArray]:
+    """The two parts of the kernel (...,) at scaled differences r (..., d), and its slopes -(dk/dr_i) / r_i (..., d).
 
-    LogNormal(sqrt(2) + log(d)/2, sqrt(3)): Hvarfner, Hellsten and Nardi 2024, "Vanilla Bayesian optimization
-    performs great in high dimensions", arXiv 2402.02229.
+    `variance` is v, `additive` is w, which may be 0.
     """
-    return math.sqrt(2.0) + 0.5 * math.log(dimension), math.sqrt(3.0)
+    squared = np.square(apart)
+    joint, slope = shape(squared.sum(axis=-1))
+    slopes = np.broadcast_to(variance * slope[..., None], apart.shape)
+    if additive == 0.0:
+        return variance * joint, np.zeros_like(joint), slopes
+    each, slope_of_each = shape(apart.shape[-1] * squared)
+    return variance * joint, additive * each.mean(axis=-1), slopes + additive * slope_of_each
+
+
+def kernel_matrix(shape: Shape, x: NDArray, z: NDArray, variance: float, additive: float) -> NDArray:
+    """The kernel (m, k) between scaled points x (m, d) and z (k, d)."""
+    k = variance * shape(cdist(x, z, "sqeuclidean"))[0]
+    if additive != 0.0:
+        d = x.shape[1]
+        for a, b in zip(x.T, z.T, strict=True):
+            k += additive / d * shape(d * np.square(a[:, None] - b))[0]
+    return k

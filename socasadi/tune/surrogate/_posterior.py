@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.distance import cdist
 
-from ._kernel import kernel_named
+from ._kernel import kernel_matrix, kernel_named, kernel_parts
 from ._warp import Warp
 
 
@@ -16,8 +15,9 @@ from ._warp import Warp
 class Hyperparameters:
     """What a fit finds, in the unit cube and for standardised targets.
 
-    `mean` is the constant mean, `variance` the kernel's, `noise` the variance of the observation noise,
-    `lengthscales` (d,); `warp` is None where the inputs are not warped.
+    `mean` is the constant mean, `variance` that of the kernel of all coordinates, `noise` the variance of the
+    observation noise, `lengthscales` (d,), `additive` the variance of the sum of one-dimensional kernels, 0 without
+    one; `warp` is None where the inputs are not warped.
     """
 
     kernel: str
@@ -25,7 +25,13 @@ class Hyperparameters:
     variance: float
     noise: float
     lengthscales: NDArray
+    additive: float = 0.0
     warp: Warp | None = None
+
+    @property
+    def prior(self) -> float:
+        """Variance of the process before any data."""
+        return self.variance + self.additive
 
     def scaled(self, x: NDArray) -> NDArray:
         """Points of the unit cube, warped and in lengthscales."""
@@ -33,8 +39,8 @@ class Hyperparameters:
 
     def covariance(self, x: NDArray, z: NDArray) -> NDArray:
         """The kernel matrix (m, k) of points x (m, d) and z (k, d)."""
-        squared = cdist(self.scaled(x), self.scaled(z), "sqeuclidean")
-        return self.variance * kernel_named(self.kernel).shape(squared)[0]
+        shape = kernel_named(self.kernel)
+        return kernel_matrix(shape, self.scaled(x), self.scaled(z), self.variance, self.additive)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,20 +78,17 @@ class Posterior:
         hyper = self.hyperparameters
         k = hyper.covariance(x, self.points)
         reduction = np.square(k @ self.root.T).sum(axis=1)
-        return hyper.mean + k @ self.alpha, np.sqrt(np.maximum(hyper.variance - reduction, self._floor))
+        return hyper.mean + k @ self.alpha, np.sqrt(np.maximum(hyper.prior - reduction, self._floor))
 
     def predict_with_gradient(self, x: NDArray) -> tuple[NDArray, float, NDArray, NDArray]:
         """Return means (w,), standard deviation, and their gradients (w, d) and (d,) at one point x (d,)."""
         hyper = self.hyperparameters
         step = hyper.scaled(x) - self._scaled
-        k, slope = kernel_named(hyper.kernel).shape(np.einsum("ij,ij->i", step, step))
-        k = hyper.variance * k
-        slope = -hyper.variance * slope
+        joint, each, slopes = kernel_parts(kernel_named(hyper.kernel), step, hyper.variance, hyper.additive)
+        k = joint + each
         half = self.root @ k
-        variance = hyper.variance - half @ half
-        # dk_i/dx = slope_i (x - x_i) / l^2, so both gradients are one product with `step`.
-        weights = np.vstack((self.alpha.T, half @ self.root)) * slope
-        gradients = (weights @ step) / hyper.lengthscales
+        variance = hyper.prior - half @ half
+        gradients = -np.vstack((self.alpha.T, half @ self.root)) @ (slopes * step) / hyper.lengthscales
         if hyper.warp is not None:
             gradients *= hyper.warp.slope(x)
         means = hyper.mean + k @ self.alpha
@@ -109,7 +112,7 @@ class Posterior:
     @property
     def _floor(self) -> float:
         # Below this the difference of k(x, x) and its reduction is rounding error.
-        return 1e-13 * self.hyperparameters.variance
+        return 1e-13 * self.hyperparameters.prior
 
 
 def condition(hyper: Hyperparameters, points: NDArray, targets: NDArray, noise: ArrayLike) -> Posterior:
