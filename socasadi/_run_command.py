@@ -12,7 +12,7 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
 
-from ._terminal import StudyFile, best_of, distance, found, out, print_chosen, replay, spared, table
+from ._terminal import StudyFile, best_of, found, out, print_chosen, print_verdicts, replay, spared
 from .campaign import (
     Assessment,
     Progress,
@@ -136,20 +136,7 @@ def _summary(result: Result, baseline: Result, assessment: Assessment) -> None:
     if told := spared(result):
         out.print(told.removeprefix("; "))
     if assessment.verdicts:
-        (factor, unit), left = distance(result.study), ("theta",)
-        limited = ("broke a limit",) if result.study.limits else ()
-        headings = ("theta", "J (median)", f"RMSE / {unit} (median, worst)", "failed", *limited)
-        headings = (*headings, f"open-loop error / {unit}")
-        title = f"\neach theta flown {result.study.verifications} times under fresh noise:"
-        judged = table(*headings, left=left, title=title)
-        for name, verdict in assessment.verdicts.items():
-            flown = ("-", "-")
-            if len(verdict.J):
-                rmse = factor * verdict.rmse
-                flown = (f"{np.median(verdict.J):.4g}", f"{np.median(rmse):.3f}, {rmse.max():.3f}")
-            counts = (str(verdict.failed), str(verdict.broken)) if limited else (str(verdict.failed),)
-            judged.add_row(name, *flown, *counts, f"{factor * verdict.prediction_error:.2f}")
-        out.print(judged)
+        print_verdicts(result.study, assessment.verdicts)
         if assessment.unidentified:
             out.print(f"no model was identified: {assessment.unidentified}")
     print_chosen(result)

@@ -1,14 +1,16 @@
 """How the command prints."""
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 from rich.console import Console
 from rich.table import Table
 
-from .campaign import Asked, Result, RunError, Study, Trial, Units, clock
+from .campaign import Asked, Result, RunError, Study, Trial, Units, Verdict, clock
 from .export import NotBuiltError, build_and_replay
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="Python file that defines `study`.")]
@@ -67,6 +69,23 @@ def print_chosen(result: Result) -> None:
     chosen = result.chosen
     why = "" if chosen.number == result.best.number else ", the best of those that were flown again"
     print_theta(result.study, chosen, f"\ntheta of trial {chosen.number}{why}:")
+
+
+def print_verdicts(study: Study, verdicts: Mapping[str, Verdict]) -> None:
+    """What each theta was worth when it was flown again."""
+    factor, unit = distance(study)
+    limited = ("broke a limit",) if study.limits else ()
+    headings = ("theta", "flights", "J (median)", f"RMSE / {unit} (median, worst)", "failed", *limited)
+    listed = table(*headings, f"open-loop error / {unit}", left=("theta",), title="\nflown under fresh noise:")
+    for name, verdict in verdicts.items():
+        flown = ("-", "-")
+        if len(verdict.J):
+            rmse = factor * verdict.rmse
+            flown = (f"{np.median(verdict.J):.4g}", f"{np.median(rmse):.3f}, {rmse.max():.3f}")
+        counts = (str(verdict.failed), str(verdict.broken)) if limited else (str(verdict.failed),)
+        flights = str(len(verdict.J) + verdict.failed)
+        listed.add_row(name, flights, *flown, *counts, f"{factor * verdict.prediction_error:.2f}")
+    out.print(listed)
 
 
 def spared(result: Result) -> str:

@@ -10,13 +10,14 @@ from rich.table import Table
 
 from ._bench_commands import ask, init, tell
 from ._run_command import run
-from ._terminal import RunFolder, best_of, distance, out, print_chosen, replay, spared, table
+from ._terminal import RunFolder, best_of, distance, out, print_chosen, print_verdicts, replay, spared, table
 from .campaign import (
     JournalError,
     Limit,
     Result,
     RunError,
     Trial,
+    assessed,
     emulate,
     trials_csv,
 )
@@ -70,6 +71,8 @@ def show(
     if study.limits:
         most = ", ".join(f"{limit.name} {limit.limit:g} {limit.unit}".rstrip() for limit in study.limits)
         out.print(f"limits: {most}; ! is above its limit")
+    if verdicts := assessed(result):
+        print_verdicts(study, verdicts)
     if best is not None:
         print_chosen(result)
     state = "complete" if result.complete else f"{len(result.trials)} of {study.trials} trials so far"

@@ -1,6 +1,6 @@
 """Experiments and the search over them: tasks, cost, episodes, the journal, and the study that ties them together."""
 
-from ._assess import Assessment, Verdict, assess
+from ._assess import Assessment, Verdict, assess, assessed
 from ._bench import Bench
 from ._emulate import ProcessorInTheLoop, emulate
 from ._result import Result
@@ -80,6 +80,7 @@ __all__ = [
     "Verdict",
     "ViolatedOutputs",
     "assess",
+    "assessed",
     "clock",
     "dask_executor",
     "emulate",

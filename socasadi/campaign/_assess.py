@@ -1,8 +1,11 @@
 """What the found theta is worth: as a controller without the luck of its trial, and as a model."""
 
+from __future__ import annotations
+
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +16,9 @@ from ._result import Result
 from .execution import flown_cost, fly_once
 from .experiment import Episode, probe
 from .store import Flight, Journal, journal_path
+
+if TYPE_CHECKING:
+    from ._study import Study
 
 # Streams of random numbers beside the trials' own, which is 0.
 _VERIFICATION, _PROBE = 1, 2
@@ -111,17 +117,34 @@ def assess(
         for name, theta in thetas.items():
             notify(f"flying {name} {study.verifications} times")
             flights = [_verification(result, journal, name, i, theta) for i in range(1, study.verifications + 1)]
-            flown = [flight for flight in flights if flight is not None and flight.score is not None]
-            scores = [flight.score for flight in flown if flight.score is not None]
-            verdicts[name] = Verdict(
-                theta,
-                J=np.array([score.J for score in scores]),
-                rmse=np.array([score.rmse for score in scores]),
-                failed=study.verifications - len(scores),
-                broken=sum(np.isinf(flown_cost(flight, study)) for flight in flown),
-                prediction_error=prediction_error(study.mpc.model, theta, judged.record) if judged else np.nan,
-            )
+            verdicts[name] = _verdict(study, theta, flights, judged)
     return Assessment(verdicts, unidentified)
+
+
+def assessed(result: Result) -> dict[str, Verdict]:
+    """What an earlier :func:`assess` has stored, by name; of thetas that went by one name the last. Flies nothing."""
+    known = result.flights()
+    judged = known["probe 2"].episode if "probe 2" in known else None
+    latest: dict[str, tuple[np.ndarray, list[Flight]]] = {}
+    for flight in known.values():
+        if (theta := flight.theta) is not None:
+            name = flight.name.rsplit(" ", 2)[0]
+            before, flown = latest.get(name, (theta, []))
+            latest[name] = theta, [*(flown if np.array_equal(before, theta) else ()), flight]
+    return {name: _verdict(result.study, theta, flown, judged) for name, (theta, flown) in latest.items()}
+
+
+def _verdict(study: Study, theta: np.ndarray, flights: Sequence[Flight | None], judged: Episode | None) -> Verdict:
+    flown = [flight for flight in flights if flight is not None and flight.score is not None]
+    scores = [flight.score for flight in flown if flight.score is not None]
+    return Verdict(
+        theta,
+        J=np.array([score.J for score in scores]),
+        rmse=np.array([score.rmse for score in scores]),
+        failed=len(flights) - len(scores),
+        broken=sum(np.isinf(flown_cost(flight, study)) for flight in flown),
+        prediction_error=prediction_error(study.mpc.model, theta, judged.record) if judged else np.nan,
+    )
 
 
 def _probing(result: Result, journal: Journal, index: int) -> Episode:

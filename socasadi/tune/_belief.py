@@ -44,8 +44,9 @@ _ALL_FULL = 30
 _PERIOD = 5
 
 
-# Processes of several kinds take turns, two asks each, for they are not wrong in the same places: bold or not, with the
-# kernel's sum or not. Every other one is the kind that predicts best where nothing is known of the cost; costs that are
+# Where a cost has no noise, processes of several kinds take turns, two asks each, for they are not wrong in the same
+# places: bold or not, with the kernel's sum or not. Every other one is the kind that predicts best where nothing is
+# known of the cost. It is the only one under noise, which the others take for features of the cost; costs that are
 # nearly sums, or whose parameters have scales of their own, are found by the others.
 _ROTA = ((False, False), (True, False), (False, False), (False, True))
 
@@ -97,7 +98,7 @@ class Believer:
         return data, cost, Start(way, cost.hyperparameters)
 
     def _settings(self, trials: Sequence[Trial]) -> FitSettings:
-        bold, sums = _ROTA[len(trials) // 2 % len(_ROTA)]
+        bold, sums = _ROTA[len(trials) // 2 % len(_ROTA) if is_exact(trials) else 0]
         return replace(self.settings, bold=bold, additive=self.settings.additive and sums)
 
     def _data(self, trials: Sequence[Trial], units: NDArray, way: int) -> Data:

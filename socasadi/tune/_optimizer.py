@@ -57,10 +57,11 @@ class Optimizer:
     mean : {"constant", "zero"}
         Learned constant, or zero, of the standardised targets.
     additive : bool
-        At two asks of eight: beside the kernel of all coordinates a sum of one-dimensional ones (Duvenaud et al. 2011).
+        Of a cost without noise, at two asks of eight: beside the kernel of all coordinates a sum of one-dimensional
+        ones (Duvenaud et al. 2011).
     priors : bool
-        On top of the marginal likelihood: lengthscales scaled with sqrt(d) (Hvarfner et al. 2024), and, except at two
-        asks of eight, lengthscales akin to each other and some noise.
+        On top of the marginal likelihood: lengthscales scaled with sqrt(d) (Hvarfner et al. 2024), akin to each other,
+        and some noise; the last two not at two asks of eight of a cost without noise.
     noise : "fitted" or float
         Fitted, or the fixed variance of the observation noise on the scale of the standardised targets. Deviations
         that are told with the trials come on top.

@@ -6,7 +6,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from socasadi.campaign import Campaign, Flight, Journal, MeasuredLimit, Result, RunError, assess
+from socasadi.campaign import Campaign, Flight, Journal, MeasuredLimit, Result, RunError, assess, assessed
 from socasadi.plant import PlantFailure
 
 
@@ -20,6 +20,20 @@ def test_no_verification_is_flown_twice(toy_study, tmp_path):
     second = assess(Result(counted, result.folder))
     assert not steps
     np.testing.assert_array_equal(first.verdicts["best"].J, second.verdicts["best"].J)
+
+
+def test_what_was_assessed_is_read_again_without_flying(toy_study, tmp_path):
+    result = toy_study.run(tmp_path / "run", progress=None)
+    assert assessed(result) == {}
+    first = assess(result, {"rival": result.trials[0].theta}).verdicts
+    read = assessed(Result(toy_study, tmp_path / "run"))
+    assert list(read) == list(first)
+    for name, verdict in read.items():
+        for value in ("theta", "J", "rmse", "failed", "broken", "prediction_error"):
+            np.testing.assert_array_equal(getattr(verdict, value), getattr(first[name], value))
+    # Of two thetas that were the best one after the other it is the later one.
+    assess(result, {"rival": result.trials[1].theta})
+    np.testing.assert_array_equal(assessed(result)["rival"].theta, result.trials[1].theta)
 
 
 def test_a_plant_that_cannot_be_probed_still_has_its_best_theta_verified(toy_study, tmp_path):

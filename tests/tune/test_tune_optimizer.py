@@ -11,12 +11,13 @@ from tune_support import BRANIN, BRANIN_MINIMUM, branin, cube, repeats, run, sph
 from socasadi.tune import Optimizer, SobolSearch
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_branin_is_solved_in_30_trials_and_sobol_is_far(seed):
-    found = run(Optimizer(BRANIN, seed=seed, seed_points=6), branin, 30).best.cost
-    sobol = run(SobolSearch(BRANIN, seed=seed), branin, 30).best.cost
-    assert found - BRANIN_MINIMUM < 0.01
-    assert found < sobol
+def test_branin_is_solved_in_30_trials_and_sobol_is_far():
+    """Of a function that spans 300 it ends within 0.01 of the minimum in the median of five seeds."""
+    found = [run(Optimizer(BRANIN, seed=seed, seed_points=6), branin, 30).best.cost for seed in range(5)]
+    sobol = [run(SobolSearch(BRANIN, seed=seed), branin, 30).best.cost for seed in range(5)]
+    assert np.median(found) - BRANIN_MINIMUM < 0.01
+    assert max(found) - BRANIN_MINIMUM < 0.05
+    assert np.all(np.array(found) < sobol)
 
 
 def test_sphere_in_six_dimensions_beats_sobol_at_equal_budget():
