@@ -43,7 +43,6 @@ _PREFERENCE = 6.0
 _ALL_FULL = 30
 _PERIOD = 5
 
-
 # Where a cost has no noise, processes of several kinds take turns, two asks each, for they are not wrong in the same
 # places: bold or not, with the kernel's sum or not. Every other one is the kind that predicts best where nothing is
 # known of the cost. It is the only one under noise, which the others take for features of the cost; costs that are

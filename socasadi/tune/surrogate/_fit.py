@@ -37,7 +37,7 @@ class FitSettings:
 
     kernel: str = "matern52"
     mean: str = "constant"
-    additive: bool = True
+    additive: bool = False
     priors: bool = True
     noise: float | None = None
     warp: bool = False
