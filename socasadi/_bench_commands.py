@@ -281,7 +281,8 @@ def _print_taken_back(campaign: Campaign, trial: Trial) -> None:
     folder = _quoted(campaign.folder)
     out.print(f"{f'trial {trial.number}':11} was told as {_outcome(trial)}; that is taken back", markup=False)
     out.print(f"run         {_left(len(campaign.trials), len(campaign.pending), campaign.study)}")
-    out.print(f"next        socasadi tell {folder} --trial {trial.number} --csv recording.csv")
+    following = f"socasadi tell {folder} --trial {trial.number} --csv recording.csv"
+    out.print(f"next        {following if trial.by_hand else 'socasadi run STUDY --resume flies it again'}")
 
 
 def _outcome(trial: Trial) -> str:

@@ -63,7 +63,7 @@ def test_show_plot_and_export_need_the_run_folder_alone(finished, tmp_path):
     assert shown.returncode == 0
     assert "best" in shown.stdout
     assert "complete" in shown.stdout
-    assert re.search(r"flown under fresh noise:.*\n.*\n +best +5 ", shown.stdout)
+    assert re.search(r"flown under fresh noise:.*\n.*\n +trial \d +5 ", shown.stdout)
     assert socasadi("plot", run, "--trial", 2, cwd=tmp_path).returncode == 0
     exported = socasadi("export", run, "--out", "c", cwd=tmp_path)
     assert exported.returncode == 0, exported.stderr

@@ -122,16 +122,24 @@ def assess(
 
 
 def assessed(result: Result) -> dict[str, Verdict]:
-    """What an earlier :func:`assess` has stored, by name; of thetas that went by one name the last. Flies nothing."""
+    """What was flown beside the search so far, by theta: ``"trial 12"``, or its name where it is of no trial.
+
+    Of thetas without a trial that went by one name, the one flown last. Flies nothing.
+    """
     known = result.flights()
     judged = known["probe 2"].episode if "probe 2" in known else None
-    latest: dict[str, tuple[np.ndarray, list[Flight]]] = {}
+    names = {trial.theta.tobytes(): f"trial {trial.number}" for trial in result.trials}
+    flights: dict[bytes, dict[str, Flight]] = {}
     for flight in known.values():
-        if (theta := flight.theta) is not None:
-            name = flight.name.rsplit(" ", 2)[0]
-            before, flown = latest.get(name, (theta, []))
-            latest[name] = theta, [*(flown if np.array_equal(before, theta) else ()), flight]
-    return {name: _verdict(result.study, theta, flown, judged) for name, (theta, flown) in latest.items()}
+        if flight.theta is not None:
+            name, _, index = flight.name.rsplit(" ", 2)
+            names.setdefault(flight.theta.tobytes(), name)
+            # Under another name it was flown with the same noise.
+            flights.setdefault(flight.theta.tobytes(), {})[index] = flight
+    return {
+        names[theta]: _verdict(result.study, np.frombuffer(theta), [*flown.values()], judged)
+        for theta, flown in flights.items()
+    }
 
 
 def _verdict(study: Study, theta: np.ndarray, flights: Sequence[Flight | None], judged: Episode | None) -> Verdict:

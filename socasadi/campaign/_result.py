@@ -132,7 +132,9 @@ class Result:
     def episode(self, number: int) -> Episode:
         """Record of trial ``number``; RunError when there is none."""
         if (episode := self._episode(number)) is None:
-            raise RunError(f"trial {number} has no record: its controller could not be made, or J was told alone")
+            raise RunError(
+                f"trial {number} has no record: it is out, its controller could not be made, or J was told alone"
+            )
         return episode
 
     def recorded(self, number: int) -> bool:

@@ -43,11 +43,11 @@ _PREFERENCE = 6.0
 _ALL_FULL = 30
 _PERIOD = 5
 
-# Where a cost has no noise, processes of several kinds take turns, two asks each, for they are not wrong in the same
-# places: bold or not, with the kernel's sum or not. Every other one is the kind that predicts best where nothing is
-# known of the cost. It is the only one under noise, which the others take for features of the cost; costs that are
-# nearly sums, or whose parameters have scales of their own, are found by the others.
-_ROTA = ((False, False), (True, False), (False, False), (False, True))
+# Kinds of processes, of which one is drawn for each number of trials, for they are not wrong in the same places: bold
+# or not, with the kernel's sum or not. Every other one is the kind that predicts best where nothing is known of the
+# cost. Once noise was seen, which the others take for features of the cost, it is the only one; costs that are nearly
+# sums, or whose parameters have scales of their own, are found by the others.
+_KINDS = ((False, False), (True, False), (False, False), (False, True))
 
 
 def last_full_fit(told: int) -> int:
@@ -97,8 +97,12 @@ class Believer:
         return data, cost, Start(way, cost.hyperparameters)
 
     def _settings(self, trials: Sequence[Trial]) -> FitSettings:
-        bold, sums = _ROTA[len(trials) // 2 % len(_ROTA) if is_exact(trials) else 0]
-        return replace(self.settings, bold=bold, additive=self.settings.additive and sums)
+        if noise_seen(trials):
+            return replace(self.settings, additive=False)
+        # By lot, and not in turn: points that are asked at once all see the same number of trials.
+        bold, sums = _KINDS[np.random.default_rng([self.seed, len(trials), 5]).integers(len(_KINDS))]
+        additive = self.settings.additive and sums and self.space.dimension > 1
+        return replace(self.settings, bold=bold, additive=additive)
 
     def _data(self, trials: Sequence[Trial], units: NDArray, way: int) -> Data:
         data = cost_data(trials, units, self.transform, way)
@@ -140,11 +144,17 @@ class Believer:
         would be too sure.
         """
         data, rows = belief.data, belief.rows_that(keep)
+        if noise_seen(belief.trials) is False:
+            best = int(data.targets[rows].argmin())
+            index = int(data.rows[rows[best]])
+            cost = float(data.restore(data.targets[rows[best]]))
+            return Estimate(index, belief.trials[index].theta, cost, cost, cost)
         rng = np.random.default_rng([self.seed, len(belief.trials), 4])
         settings = replace(self.settings, additive=False)
         about = data.points, data.targets, settings, rng, data.known
         least = _seen_noise(belief.trials, data)
-        drawn = draw(*about, fit(*about, None, least), _DRAWN, least)
+        hyper = belief.cost.hyperparameters if settings == self._settings(belief.trials) else fit(*about, None, least)
+        drawn = draw(*about, hyper, _DRAWN, least)
         told = [condition(one, data.points, data.targets[:, None], one.noise + data.known) for one in drawn]
         means, deviations = zip(*(process.predict(data.points[rows]) for process in told), strict=True)
         means = np.hstack(means)
@@ -213,16 +223,18 @@ class Belief:
         """The cost's process in worlds where the costs without noise are known, at the told and at further points."""
         known = np.vstack([self.cost.points, points]) if len(points) else self.cost.points
         drawn = self.cost.sample(known, worlds, rng)
-        return condition(self.cost.hyperparameters, known, drawn, _EXACT * self.cost.hyperparameters.prior)
+        return condition(self.cost.hyperparameters, known, drawn, _EXACT * self.cost.hyperparameters.prior_variance)
 
 
-def is_exact(trials: Sequence[Trial]) -> bool:
-    """Whether the cost has no noise: a point that was told twice had one and the same."""
-    return any(np.ptp(told) <= 1e-10 * np.abs(told).max() for told in _repeated(trials))
+def noise_seen(trials: Sequence[Trial]) -> bool | None:
+    """Whether a point that was told more than one cost had different ones; None while there is no such point."""
+    if not (costs := _repeated(trials)):
+        return None
+    return any(np.ptp(told) > 1e-10 * np.abs(told).max() for told in costs)
 
 
 def _quantiles(means: NDArray, deviations: NDArray, levels: Sequence[float]) -> NDArray:
-    """Quantiles of a mixture of normal distributions in equal parts."""
+    """Quantiles (q,) at levels (q,) of a mixture of normal distributions in equal parts: means, deviations (k,)."""
     ends = means + 9 * np.outer((-1, 1), deviations)
 
     def excess(x: float, level: float) -> float:

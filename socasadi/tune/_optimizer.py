@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
-from ._belief import Belief, Believer, Start, is_exact, last_full_fit
+from ._belief import Belief, Believer, Start, last_full_fit, noise_seen
 from ._search import Estimate, History, Timings, Trial, check_seed, keeps_limits
 from ._sobol import SobolPoints
 from ._space import Space
@@ -57,11 +57,11 @@ class Optimizer:
     mean : {"constant", "zero"}
         Learned constant, or zero, of the standardised targets.
     additive : bool
-        Of a cost without noise, at two asks of eight: beside the kernel of all coordinates a sum of one-dimensional
-        ones (Duvenaud et al. 2011).
+        Until noise is seen, at one ask of four: beside the kernel of all coordinates a sum of one-dimensional ones
+        (Duvenaud et al. 2011).
     priors : bool
         On top of the marginal likelihood: lengthscales scaled with sqrt(d) (Hvarfner et al. 2024), akin to each other,
-        and some noise; the last two not at two asks of eight of a cost without noise.
+        and some noise; until noise is seen, the last two not at one ask of four.
     noise : "fitted" or float
         Fitted, or the fixed variance of the observation noise on the scale of the standardised targets. Deviations
         that are told with the trials come on top.
@@ -135,6 +135,7 @@ class Optimizer:
         self._sobol = SobolPoints(space, self._seed, admissible)
         self._timings = Timings()
         self._belief: Belief | None = None
+        self._estimate: tuple[Belief, Estimate] | None = None
         self._full: tuple[int, Start] | None = None
         self._asked: tuple[tuple[int, bytes], NDArray] | None = None
 
@@ -184,8 +185,11 @@ class Optimizer:
         """
         if self.best is None or sum(trial.cost is not None for trial in self.trials) < 2:
             return None
-        with threadpool_limits(1):
-            return self._believer.estimate(self._believe(), self._keeps_limits)
+        belief = self._believe()
+        if self._estimate is None or self._estimate[0] is not belief:
+            with threadpool_limits(1):
+                self._estimate = (belief, self._believer.estimate(belief, self._keeps_limits))
+        return self._estimate[1]
 
     @property
     def timings(self) -> Timings:
@@ -195,6 +199,8 @@ class Optimizer:
     @property
     def hyperparameters(self) -> dict[str, float]:
         """The last fit's hyperparameters as plain numbers, for a log; empty before the first fit.
+
+        Until noise is seen, fits are of several kinds by turns: with the sum (``additive`` above 0) or without.
 
         Lengthscales are in the unit cube, under "lengthscale:NAME"; mean, variance, additive (the variance of the sum
         of one-dimensional kernels) and noise (a variance) refer to the standardised targets.
@@ -320,7 +326,7 @@ class Optimizer:
             merit = Merit(self._acquisition, None, np.zeros(1), constraints)
         incumbents = belief.data.points[order[:_INCUMBENTS]]
         taken = np.vstack([belief.units, waiting])
-        if may_repeat := self._repeat and len(kept) and not len(waiting) and not is_exact(self.trials):
+        if may_repeat := self._repeat and len(kept) and not len(waiting) and noise_seen(self.trials) is not False:
             theta = self.trials[belief.data.rows[order[0]]].theta
             if _is_time_to_repeat(len(self.trials)) and self._may_ask(theta):
                 return theta
@@ -344,8 +350,12 @@ class Optimizer:
             rivals = np.vstack([belief.data.points[kept], likely])
             return cost, cost.predict(rivals)[0].min(axis=0)
         best = belief.data.targets[kept].min()
-        if self._acquisition.alternating and len(self.trials) % 2:
-            best = belief.cost.predict(belief.data.points[kept])[0].min()
+        if self._acquisition.alternating:
+            mean, std = belief.cost.predict(belief.data.points[kept])
+            if (len(self.trials) + len(waiting)) % 2:
+                best = mean.min()
+            elif noise_seen(self.trials):
+                best = (mean[:, 0] - std).min()
         if not len(waiting):
             return belief.cost, np.array([best])
         cost = belief.imagined(waiting, _FANTASIES, rng)

@@ -25,15 +25,23 @@ def test_no_verification_is_flown_twice(toy_study, tmp_path):
 def test_what_was_assessed_is_read_again_without_flying(toy_study, tmp_path):
     result = toy_study.run(tmp_path / "run", progress=None)
     assert assessed(result) == {}
-    first = assess(result, {"rival": result.trials[0].theta}).verdicts
+    worst = max(result.trials, key=lambda trial: trial.J or 0.0)
+    rivals = {"rival": worst.theta, "stranger": 0.9 * result.best.theta}
+    first = assess(result, rivals).verdicts
     read = assessed(Result(toy_study, tmp_path / "run"))
-    assert list(read) == list(first)
-    for name, verdict in read.items():
-        for value in ("theta", "J", "rmse", "failed", "broken", "prediction_error"):
-            np.testing.assert_array_equal(getattr(verdict, value), getattr(first[name], value))
-    # Of two thetas that were the best one after the other it is the later one.
-    assess(result, {"rival": result.trials[1].theta})
-    np.testing.assert_array_equal(assessed(result)["rival"].theta, result.trials[1].theta)
+    assert {f"trial {result.best.number}", f"trial {worst.number}", "stranger", "identified"} <= set(read)
+    assert {verdict.theta.tobytes() for verdict in read.values()} == {one.theta.tobytes() for one in first.values()}
+    for verdict in read.values():
+        (same,) = [one for one in first.values() if np.array_equal(one.theta, verdict.theta)]
+        for value in ("J", "rmse", "failed", "broken", "prediction_error"):
+            np.testing.assert_array_equal(getattr(verdict, value), getattr(same, value))
+    # One that was assessed before is still itself, and keeps all its flights.
+    assess(result, {"rival": result.trials[0].theta})
+    more = replace(toy_study, verifications=toy_study.verifications + 1)
+    assess(Result(more, result.folder), rivals)
+    again = assessed(Result(more, result.folder))
+    assert len(again[f"trial {worst.number}"].J) == more.verifications
+    assert "trial 1" in again
 
 
 def test_a_plant_that_cannot_be_probed_still_has_its_best_theta_verified(toy_study, tmp_path):

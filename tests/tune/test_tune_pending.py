@@ -161,3 +161,15 @@ def test_four_at_a_time_need_no_more_than_half_as_many_again_in_the_median():
     seeds = range(2, 12)
     four, one = (np.median([needed(seed, q) for seed in seeds]) for q in (4, 1))
     assert four <= 1.5 * one
+
+
+@pytest.mark.parametrize("size", [4, 8])
+def test_batches_meet_processes_of_every_kind(size):
+    """Points that are asked at once see one and the same process; it must not be of one kind in every batch."""
+    search = Optimizer(cube(2), seed=0, seed_points=size)
+    sums = []
+    for _ in range(8):
+        for theta in search.ask_batch(size):
+            search.tell(theta, sphere(theta))
+        sums.append(search.hyperparameters.get("additive", 0.0) > 0)
+    assert 1 <= sum(sums) <= 5

@@ -25,7 +25,7 @@ class Asked:
     give_up
         J above which its episode may be cut; None for never.
     asked
-        Number of the event: asks and tells are counted together, from 1, in the order in which they happened.
+        Number of the event: asks, tells and takings back are counted together, from 1, as they happened.
     started
         UTC, ISO 8601.
     by_hand

@@ -35,7 +35,9 @@ class Acquisition:
         It is to be averaged over what the noise may have hidden at the points already told.
     alternating : bool
         At every other ask the best to improve on is the lowest cost believed at a told point, not the lowest observed.
-        The lower of the two explores, the other refines what is there, and neither does better on all costs.
+        The lower of the two explores, the other refines what is there, and neither does better on all costs. Once noise
+        was seen, the lowest observed is mostly luck, and its place is taken by the lowest that a told point may well
+        have: what is believed of it less one deviation.
     """
 
     function: Callable[[NDArray, NDArray, NDArray | float], Partials]

@@ -207,7 +207,7 @@ def fit(
     known : ndarray (n,), optional
         Variance of each target's own noise, where that is known; the common noise comes on top.
     start : Hyperparameters, optional
-        Of an earlier fit by the same settings: the only start.
+        Of an earlier fit: the only start.
     least_noise : float
         Lower bound of a fitted noise variance.
 
@@ -243,7 +243,7 @@ def draw(
         # Priors are densities of the lengthscales themselves, the space that is sampled is that of their logarithms.
         return (float(z[loss.lengthscales].sum()) if settings.priors else 0.0) - loss(z)[0]
 
-    drawn = slice_sample(log_density, loss.position(start), loss.bounds, count, rng)
+    drawn = slice_sample(log_density, loss.position(start), loss.bounds, loss.lengthscales, count, rng)
     return [loss.hyperparameters(z) for z in drawn]
 
 

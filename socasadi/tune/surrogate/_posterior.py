@@ -29,7 +29,7 @@ class Hyperparameters:
     warp: Warp | None = None
 
     @property
-    def prior(self) -> float:
+    def prior_variance(self) -> float:
         """Variance of the process before any data."""
         return self.variance + self.additive
 
@@ -78,7 +78,7 @@ class Posterior:
         hyper = self.hyperparameters
         k = hyper.covariance(x, self.points)
         reduction = np.square(k @ self.root.T).sum(axis=1)
-        return hyper.mean + k @ self.alpha, np.sqrt(np.maximum(hyper.prior - reduction, self._floor))
+        return hyper.mean + k @ self.alpha, np.sqrt(np.maximum(hyper.prior_variance - reduction, self._floor))
 
     def predict_with_gradient(self, x: NDArray) -> tuple[NDArray, float, NDArray, NDArray]:
         """Return means (w,), standard deviation, and their gradients (w, d) and (d,) at one point x (d,)."""
@@ -87,7 +87,7 @@ class Posterior:
         joint, each, slopes = kernel_parts(kernel_named(hyper.kernel), step, hyper.variance, hyper.additive)
         k = joint + each
         half = self.root @ k
-        variance = hyper.prior - half @ half
+        variance = hyper.prior_variance - half @ half
         gradients = -np.vstack((self.alpha.T, half @ self.root)) @ (slopes * step) / hyper.lengthscales
         if hyper.warp is not None:
             gradients *= hyper.warp.slope(x)
@@ -112,7 +112,7 @@ class Posterior:
     @property
     def _floor(self) -> float:
         # Below this the difference of k(x, x) and its reduction is rounding error.
-        return 1e-13 * self.hyperparameters.prior
+        return 1e-13 * self.hyperparameters.prior_variance
 
 
 def condition(hyper: Hyperparameters, points: NDArray, targets: NDArray, noise: ArrayLike) -> Posterior:
