@@ -63,7 +63,7 @@ def test_show_plot_and_export_need_the_run_folder_alone(finished, tmp_path):
     assert shown.returncode == 0
     assert "best" in shown.stdout
     assert "complete" in shown.stdout
-    assert re.search(r"flown under fresh noise:.*\n.*\n +trial \d +5 ", shown.stdout)
+    assert re.search(r"flown under fresh noise:.*\n.*\n +trial \d +1 ", shown.stdout)
     assert socasadi("plot", run, "--trial", 2, cwd=tmp_path).returncode == 0
     exported = socasadi("export", run, "--out", "c", cwd=tmp_path)
     assert exported.returncode == 0, exported.stderr
@@ -93,8 +93,10 @@ def test_without_a_compiler_it_says_so_once_and_gives_the_same_numbers(finished,
         Journal(folder / "runs" / "study" / "journal.sqlite") as compiled,
         Journal(tmp_path / "runs" / "study" / "journal.sqlite") as interpreted,
     ):
-        costs = [[trial.J for trial in journal.trials()] for journal in (compiled, interpreted)]
-    np.testing.assert_allclose(*costs, rtol=1e-6)
+        one, other = ([trial.J for trial in journal.trials()] for journal in (compiled, interpreted))
+    np.testing.assert_allclose(one[:4], other[:4], rtol=1e-9)
+    # Where the search asks next hangs on the last bits of these, by way of where a descent ends.
+    np.testing.assert_allclose(one[4:], other[4:], rtol=1e-4)
 
 
 def test_ctrl_c_says_how_to_go_on_and_going_on_finishes(tmp_path):
