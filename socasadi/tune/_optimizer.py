@@ -200,7 +200,7 @@ class Optimizer:
     def hyperparameters(self) -> dict[str, float]:
         """The last fit's hyperparameters as plain numbers, for a log; empty before the first fit.
 
-        Until noise is seen, fits are of several kinds by turns: with the sum (``additive`` above 0) or without.
+        Until noise is seen, fits are of several kinds, by lot: with the sum (``additive`` above 0) or without.
 
         Lengthscales are in the unit cube, under "lengthscale:NAME"; mean, variance, additive (the variance of the sum
         of one-dimensional kernels) and noise (a variance) refer to the standardised targets.
