@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ._terminal import RunFolder, StudyFile, distance, out, print_theta, table
+from ._terminal import RunFolder, StudyFile, distance, out, outcome, print_theta, table
 from .campaign import (
     Asked,
     Bench,
@@ -136,6 +136,8 @@ def tell(
         raise RunError("tell takes exactly one of --csv FILE, --cost J, --failed REASON and --take-back")
     if measured and cost is None:
         raise RunError("--measured goes with --cost; from a recording it is computed")
+    if anyway and recording is None:
+        raise RunError("--anyway goes with --csv: it takes a recording whose inputs are not the controller's")
     if failed is not None and not failed.strip():
         raise RunError("--failed takes the reason, in a few words")
     values = _measured(measured or [])
@@ -251,7 +253,7 @@ def _print_pending(result: Result, as_json: bool) -> None:
 def _print_told(campaign: Campaign, told: Trial, before: Trial | None) -> None:
     study, score = campaign.study, told.score
     factor, unit = distance(study)
-    line = _outcome(told)
+    line = outcome(told)
     if told.outcome == "cut":
         line += f"; {told.saved_seconds or 0:g} s were spared"
     if score is not None:
@@ -279,20 +281,10 @@ def _print_told(campaign: Campaign, told: Trial, before: Trial | None) -> None:
 
 def _print_taken_back(campaign: Campaign, trial: Trial) -> None:
     folder = _quoted(campaign.folder)
-    out.print(f"{f'trial {trial.number}':11} was told as {_outcome(trial)}; that is taken back", markup=False)
+    out.print(f"{f'trial {trial.number}':11} was told as {outcome(trial)}; that is taken back", markup=False)
     out.print(f"run         {_left(len(campaign.trials), len(campaign.pending), campaign.study)}")
     following = f"socasadi tell {folder} --trial {trial.number} --csv recording.csv"
     out.print(f"next        {following if trial.by_hand else 'socasadi run STUDY --resume flies it again'}")
-
-
-def _outcome(trial: Trial) -> str:
-    match trial.outcome:
-        case "failed":
-            return f"failed: {trial.failure}"
-        case "cut":
-            return f"cut: J is at least {trial.at_least:.5g}"
-        case "done":
-            return f"J = {trial.J:.5g}"
 
 
 def _left(told: int, pending: int, study: Study) -> str:

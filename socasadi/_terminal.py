@@ -64,6 +64,17 @@ def found(result: Result) -> str:
     return ", ".join(told)
 
 
+def outcome(trial: Trial) -> str:
+    """What came of a trial, in a few words."""
+    match trial.outcome:
+        case "failed":
+            return f"failed: {trial.failure}"
+        case "cut":
+            return f"cut: J is at least {trial.at_least:.5g}"
+        case "done":
+            return f"J = {trial.J:.5g}"
+
+
 def print_chosen(result: Result) -> None:
     """The theta whose controller is exported."""
     chosen = result.chosen

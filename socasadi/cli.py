@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ._bench_commands import ask, init, tell
 from ._run_command import run
-from ._terminal import RunFolder, best_of, distance, out, print_chosen, print_verdicts, replay, spared, table
+from ._terminal import RunFolder, best_of, distance, out, outcome, print_chosen, print_verdicts, replay, spared, table
 from .campaign import (
     JournalError,
     Limit,
@@ -71,6 +71,8 @@ def show(
     if study.limits:
         most = ", ".join(f"{limit.name} {limit.limit:g} {limit.unit}".rstrip() for limit in study.limits)
         out.print(f"limits: {most}; ! is above its limit")
+    for trial in result.taken_back:
+        out.print(f"taken back: trial {trial.number}, told as {outcome(trial)}", markup=False)
     if verdicts := assessed(result):
         print_verdicts(study, verdicts)
     if best is not None:
@@ -160,13 +162,9 @@ def _measured(limit: Limit, trial: Trial) -> str:
 
 
 def _outcome(trial: Trial, best: Trial | None) -> str:
-    match trial.outcome:
-        case "failed":
-            return f"failed: {trial.failure}"
-        case "cut":
-            return f"cut: J above {trial.at_least:.4g}"
-        case "done":
-            return "best" if best is not None and trial.number == best.number else ""
+    if trial.outcome == "done":  # its J has a column
+        return "best" if best is not None and trial.number == best.number else ""
+    return outcome(trial)
 
 
 if __name__ == "__main__":

@@ -399,6 +399,7 @@ def test_a_robot_that_python_never_touches_cannot_be_run(at_the_bench, socasadi)
         (("tell", "runs/study", "--trial", 1, "--csv", "nowhere.csv"), "there is no recording nowhere.csv"),
         (("tell", "runs/study", "--trial", 1, "--csv", "."), "directory"),
         (("tell", "runs/study", "--trial", 1, "--failed", " "), "--failed takes the reason"),
+        (("tell", "runs/study", "--trial", 1, "--cost", 3, "--anyway"), "--anyway goes with --csv"),
         (("tell", "runs/study", "--trial", 1, "--failed", "no", "--measured", "a=1"), "--measured goes with --cost"),
         (("tell", "runs/study", "--trial", 1, "--cost", 3, "--measured", "a"), "--measured takes NAME=VALUE"),
         (("show", "runs/study", "--csv", "no/where.csv"), "no/where.csv"),
@@ -431,5 +432,6 @@ def test_what_was_told_wrong_is_taken_back_and_told_anew(at_the_bench, socasadi)
     said = socasadi("tell", "runs/study", "--trial", 1, "--take-back")
     assert "trial 1     was told as J = 0.5; that is taken back" in said
     assert "0 of 6 trials told, 1 out, 5 to be asked" in said
+    assert "taken back: trial 1, told as J = 0.5" in socasadi("show", "runs/study")
     assert "best        J = 5, trial 1" in socasadi("tell", "runs/study", "--trial", 1, "--cost", 5)
     assert "nothing was told of trial 2" in socasadi("tell", "runs/study", "--trial", 2, "--take-back", refused=True)

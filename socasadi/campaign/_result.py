@@ -63,6 +63,12 @@ class Result:
             return journal.pending()
 
     @property
+    def taken_back(self) -> list[Trial]:
+        """What was told and taken back (see :meth:`Campaign.take_back`), in the order of taking back."""
+        with self._journal() as journal:
+            return [trial for _, trial in journal.taken_back()]
+
+    @property
     def best(self) -> Trial:
         """The best observed: of least J among those that kept all limits; RunError when none did."""
         best = best_trial(self.trials, self.study)
