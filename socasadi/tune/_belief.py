@@ -32,8 +32,10 @@ from .surrogate import (
 # A value drawn at a told point is exact; so much of the variance keeps the matrix regular.
 _EXACT = 1e-6
 
-# Hyperparameters that an estimate averages over.
+# Hyperparameters that an estimate averages over, and what it holds for the noise before the data: too little would make
+# it too sure.
 _DRAWN = 16
+_LIKELY_NOISE = (1e-1, 2.0)
 
 # By so much the logarithm of another way's evidence has to be above the first's: several ways are tried, and each is
 # fitted to the same costs.
@@ -150,11 +152,10 @@ class Believer:
             cost = float(data.restore(data.targets[rows[best]]))
             return Estimate(index, belief.trials[index].theta, cost, cost, cost)
         rng = np.random.default_rng([self.seed, len(belief.trials), 4])
-        settings = replace(self.settings, additive=False)
+        settings = replace(self.settings, additive=False, likely_noise=_LIKELY_NOISE)
         about = data.points, data.targets, settings, rng, data.known
         least = _seen_noise(belief.trials, data)
-        hyper = belief.cost.hyperparameters if settings == self._settings(belief.trials) else fit(*about, None, least)
-        drawn = draw(*about, hyper, _DRAWN, least)
+        drawn = draw(*about, fit(*about, None, least), _DRAWN, least)
         told = [condition(one, data.points, data.targets[:, None], one.noise + data.known) for one in drawn]
         means, deviations = zip(*(process.predict(data.points[rows]) for process in told), strict=True)
         means = np.hstack(means)

@@ -30,9 +30,9 @@ class FitSettings:
 
     `noise` is None (fitted) or a fixed variance on the standardised scale; `additive` gives the kernel a sum of
     one-dimensional ones beside that of all coordinates; `priors` puts those of `_prior.py` on top of the likelihood,
-    without them it is pure maximum likelihood; `bold` ones leave the lengthscales and the noise to the data; `warp`
-    fits a warping of the inputs, too; of `screened` random starts the best `restarts` are optimised, beside the fixed
-    start.
+    without them it is pure maximum likelihood; `bold` ones leave the lengthscales and the noise to the data, others
+    hold `likely_noise` for it (median of its variance, deviation of the logarithm); `warp` fits a warping of the
+    inputs, too; of `screened` random starts the best `restarts` are optimised, beside the fixed start.
     """
 
     kernel: str = "matern52"
@@ -42,6 +42,7 @@ class FitSettings:
     noise: float | None = None
     warp: bool = False
     bold: bool = False
+    likely_noise: tuple[float, float] = (1e-2, 3.0)
     screened: int = 60
     restarts: int = 4
 
@@ -130,7 +131,8 @@ class Loss:
             (self.lengthscales, functools.partial(lengthscale_penalty, akin=not self.settings.bold))
         ]
         if self.settings.noise is None and not self.settings.bold:
-            priors.append((self.noise, noise_penalty))
+            median, deviation = self.settings.likely_noise
+            priors.append((self.noise, functools.partial(noise_penalty, median=median, deviation=deviation)))
         if self.settings.additive:
             priors.append((slice(self.kernel.start, self.kernel.stop), balance_penalty))
         for part, prior in priors:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 _SCALE = math.sqrt(3.0)
 _APART = 0.5
-_NOISE, _NOISE_DEVIATION = math.log(1e-2), 3.0
 _BALANCE = 2.0
 
 
@@ -33,13 +32,13 @@ def lengthscale_penalty(logs: NDArray, akin: bool = True) -> tuple[float, NDArra
     return float(value), slope
 
 
-def noise_penalty(logs: NDArray) -> tuple[float, NDArray]:
-    """Of the noise's variance (1): log-normal about 1e-2, with a deviation of 3.
+def noise_penalty(logs: NDArray, median: float, deviation: float) -> tuple[float, NDArray]:
+    """Of the noise's variance (1): log-normal with that median, and that deviation of its logarithm.
 
     Few data cannot tell a rough cost from a noisy one, and a process without noise bends to every ripple.
     """
-    standard = (logs - _NOISE) / _NOISE_DEVIATION
-    return 0.5 * float(standard @ standard), standard / _NOISE_DEVIATION
+    standard = (logs - math.log(median)) / deviation
+    return 0.5 * float(standard @ standard), standard / deviation
 
 
 def balance_penalty(logs: NDArray) -> tuple[float, NDArray]:
