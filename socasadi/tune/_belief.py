@@ -42,8 +42,9 @@ _LIKELY_NOISE = (1e-1, 2.0)
 _PREFERENCE = 6.0
 
 # So many trials, and each multiple of the period after them, get a full fit; between, the descent starts at its result.
+# The period is doubled at 200, 400, 800, ... trials.
 _ALL_FULL = 30
-_PERIOD = 5
+_PERIOD, _FIRST_DOUBLED = 5, 200
 
 # Kinds of processes, of which one is drawn for each number of trials, for they are not wrong in the same places: bold
 # or not, with the kernel's sum or not. Every other one is the kind that predicts best where nothing is known of the
@@ -54,7 +55,8 @@ _KINDS = ((False, False), (True, False), (False, False), (False, True))
 
 def last_full_fit(told: int) -> int:
     """The number of trials, of `told` ones, whose fit had all its starts."""
-    return told if told <= _ALL_FULL else told - told % _PERIOD
+    period = 1 if told <= _ALL_FULL else _PERIOD << (told // _FIRST_DOUBLED).bit_length()
+    return told - told % period
 
 
 @dataclass(frozen=True, eq=False)

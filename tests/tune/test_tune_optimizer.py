@@ -9,6 +9,7 @@ import pytest
 from tune_support import BRANIN, BRANIN_MINIMUM, branin, cube, repeats, run, sphere, told
 
 from socasadi.tune import Optimizer, SobolSearch
+from socasadi.tune._belief import last_full_fit
 
 
 def test_branin_is_solved_in_30_trials_and_sobol_is_far():
@@ -130,6 +131,17 @@ def test_a_long_search_is_replayed_wherever_it_is_taken_up():
             if count % 2:
                 resumed.predict([0.5, 0.5])
             np.testing.assert_array_equal(resumed.ask(), live.ask())
+
+
+def test_full_fits_become_rarer_and_each_number_of_trials_has_the_one_before_it():
+    numbers = range(1, 1601)
+    full = [told for told in numbers if last_full_fit(told) == told]
+    assert [last_full_fit(told) for told in numbers] == [max(f for f in full if f <= told) for told in numbers]
+    assert full[:30] == list(range(1, 31))
+    apart = np.diff(full[29:])
+    assert apart[0] == 5
+    assert sorted(apart) == apart.tolist()
+    assert np.all(apart <= 0.1 * np.array(full[30:]) + 2)
 
 
 def test_beyond_the_active_set_the_search_goes_on_and_knows_its_best():
