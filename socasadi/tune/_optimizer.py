@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
@@ -87,10 +88,11 @@ class Optimizer:
     Notes
     -----
     Failed trials teach a Gaussian process of their own where experiments fail, and the acquisition is weighed with the
-    probability of success; they never are the best. While there are only failures the Sobol sequence goes on.
-    Trials that were cut count as lower bounds. The best told point is asked again after 20, 40, 80, ... trials, which
-    shows how much noise there is, and whenever the model expects more of that than of any new point; a cost that came
-    out the same to ten digits is taken for free of noise, and no point is asked again.
+    probability of success, the more so the more trials in a row were lost; they never are the best. While there are
+    only failures the Sobol sequence goes on. Trials that were cut count as lower bounds. The best told point is asked
+    again after 20, 40, 80, ... trials, which shows how much noise there is, and whenever the model expects more of that
+    than of any new point; a cost that came out the same to ten digits is taken for free of noise, and no point is asked
+    again.
     """
 
     def __init__(
@@ -321,7 +323,7 @@ class Optimizer:
         if len(kept):
             order = kept[np.argsort(belief.data.targets[kept], kind="stable")]
             cost, best = self._worlds(belief, kept, waiting, _likely(waiting, constraints), rng)
-            merit = Merit(self._acquisition, cost, best, constraints)
+            merit = Merit(self._acquisition, cost, best, constraints, 1.0 + self._lost_in_a_row())
         else:
             merit = Merit(self._acquisition, None, np.zeros(1), constraints)
         incumbents = belief.data.points[order[:_INCUMBENTS]]
@@ -363,6 +365,15 @@ class Optimizer:
 
     def _keeps_limits(self, trial: Trial) -> bool:
         return keeps_limits(trial, self._history.limits)
+
+    def _lost_in_a_row(self) -> int:
+        """How many of the last trials have failed or broken a limit, one after the other.
+
+        They say nothing of the cost, which therefore seems worth a try wherever they were; so the chance of success
+        counts the more, the longer there is none.
+        """
+        lost = (trial.at_least is None and not self._keeps_limits(trial) for trial in reversed(self.trials))
+        return sum(itertools.takewhile(bool, lost))
 
     def _may_ask(self, theta: NDArray) -> bool:
         return self._admissible is None or bool(self._admissible(theta))

@@ -19,6 +19,7 @@ def gpy_model(hyper, points, failed, kernel, method="Laplace"):
     kern = {"rbf": GPy.kern.RBF, "matern52": GPy.kern.Matern52}[kernel](
         points.shape[1], variance=hyper.variance, lengthscale=hyper.lengthscales, ARD=True
     )
+    kern = kern + GPy.kern.Bias(points.shape[1], variance=hyper.common)
     inference = getattr(GPy.inference.latent_function_inference, method)()
     return GPy.core.GP(points, failed.astype(float)[:, None], kern, GPy.likelihoods.Bernoulli(), None, inference)
 
@@ -64,9 +65,10 @@ def test_no_other_hyperparameters_nearby_are_more_likely(kernel):
 
     def density(logs):
         model = gpy_model(hyper, points, failed, kernel)
-        model.kern[:] = np.exp(logs)
+        model.kern[:] = np.exp([*logs, logs[0]])
         scale = np.exp(np.sqrt(2) + 0.5 * np.log(2))
         prior = lognorm.logpdf(np.exp(logs[1:]), s=np.sqrt(3), scale=scale).sum()
+        prior += norm.logpdf(logs[0], np.log(30), 1)
         prior -= 0.5 * np.sum(((logs[1:] - logs[1:].mean()) / 0.5) ** 2)
         return float(np.squeeze(model.log_likelihood())) + prior
 

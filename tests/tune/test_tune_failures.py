@@ -22,7 +22,9 @@ def check_plateau(d, seed, trials):
     free = run(Optimizer(cube(d), seed=seed, seed_points=seeds), edge, trials)
     half = run(Optimizer(cube(d), seed=seed, seed_points=seeds), edge, trials, beyond_half)
     random = run(SobolSearch(cube(d), seed=seed), edge, trials, beyond_half)
-    asked = half.trials[seeds:]
+    # Once it is there, it asks on both sides of the border.
+    there = next((i for i, trial in enumerate(half.trials) if trial.cost is not None and trial.cost < 0.101), trials)
+    asked = half.trials[seeds:there]
     assert sum(trial.failed for trial in asked) < 0.3 * len(asked)  # half of them at random
     assert half.best.cost - 0.1 < 0.15 * (random.best.cost - 0.1)
     assert half.best.cost - 0.1 < 5 * (free.best.cost - 0.1) + 0.01
@@ -37,6 +39,17 @@ def test_half_of_a_box_of_six_dimensions_may_fail():
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_half_of_a_box_may_fail(d, seed):
     check_plateau(d, seed, 30 + 2 * d)
+
+
+@pytest.mark.parametrize(("share", "seed"), [(0.5, 0), pytest.param(0.25, 1, marks=pytest.mark.slow)])
+def test_a_box_within_the_box_is_found_whose_every_border_fails(share, seed):
+    # No half-space: a search that looks for costs where there are none yet goes from one face of the box to the next.
+    half = share ** (1 / 6) / 2
+    trials = 40
+    search = run(Optimizer(cube(6), seed=seed), sphere, trials, fails=lambda theta: np.abs(theta - 0.45).max() > half)
+    asked = search.trials[10:]
+    assert sum(not trial.failed for trial in asked) > 0.5 * len(asked)  # at random half of them and a quarter
+    assert search.best.cost < 0.12  # 0.1 is the least
 
 
 def test_failures_steer_the_search_away_and_are_never_the_best():

@@ -18,7 +18,7 @@ ACQUISITIONS = ("ei", "log_ei", "noisy_ei", "ucb")
 
 def process(seed, worlds=1, kernel="matern52", warp=None, noise=1e-3):
     rng = np.random.default_rng(seed)
-    hyper = Hyperparameters(kernel, 0.2, 1.3, noise, rng.uniform(0.3, 0.9, D), seed % 2 * 0.7, warp)
+    hyper = Hyperparameters(kernel, 0.2, 1.3, noise, rng.uniform(0.3, 0.9, D), seed % 2 * 0.7, warp, seed % 3 * 0.4)
     return condition(hyper, POINTS, rng.normal(size=(N, worlds)), noise)
 
 
@@ -43,7 +43,7 @@ def test_gradient_of_the_merit_is_that_of_its_value(acquisition, worlds, kernel,
     cost = process(1, worlds, kernel, inputs)
     kept = [Constraint(process(2, 1, kernel, inputs), 0.4), Constraint(process(3, 1, kernel), 0.0, 1.0)][:constraints]
     best = np.linspace(-0.5, 0.5, worlds)
-    merit = Merit(acquisition_named(acquisition), cost, best, kept)
+    merit = Merit(acquisition_named(acquisition), cost, best, kept, 1.0 + 1.5 * warped)
     for x in np.random.default_rng(4).uniform(0.05, 0.95, (6, D)):
         value, gradient = merit.with_gradient(x)
         assert value == pytest.approx(merit(x[None])[0], rel=1e-9, abs=1e-12)
@@ -83,7 +83,7 @@ def test_a_constraint_is_the_probability_that_the_quantity_stays_below_its_limit
 
 
 @pytest.mark.parametrize("acquisition", ACQUISITIONS)
-def test_worlds_are_averaged_and_probabilities_multiplied(acquisition):
+def test_worlds_are_averaged_and_multiplied_by_the_power_of_the_probability(acquisition):
     chosen, worlds = acquisition_named(acquisition), 4
     cost, best = process(1, worlds), np.array([-0.5, 0.0, 0.1, 0.6])
     constraint = Constraint(process(2), 0.4)
@@ -92,8 +92,8 @@ def test_worlds_are_averaged_and_probabilities_multiplied(acquisition):
         Merit(chosen, replace(cost, alpha=cost.alpha[:, [i]]), best[[i]])(x) for i in range(worlds)
     ]  # each world by itself
     plain = np.mean(np.exp(alone) if chosen.logarithm else alone, axis=0)
-    expected = plain * np.exp(constraint.log_probability(x))
-    value = Merit(chosen, cost, best, [constraint])(x)
+    expected = plain * np.exp(constraint.log_probability(x)) ** 3
+    value = Merit(chosen, cost, best, [constraint], caution=3.0)(x)
     np.testing.assert_allclose(np.exp(value) if chosen.logarithm else value, expected, rtol=1e-10)
 
 

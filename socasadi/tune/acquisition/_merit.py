@@ -53,18 +53,21 @@ class Merit:
     best : ndarray (w,)
         J* of each world, on the scale of the targets.
     constraints : sequence of Constraint
+    caution : float
+        Power of the constraints' probability by which the acquisition is weighed.
     """
 
     acquisition: Acquisition
     cost: Posterior | None
     best: NDArray
     constraints: Sequence[Constraint] = ()
+    caution: float = 1.0
 
     def __call__(self, x: NDArray) -> NDArray:
         """At points x (m, d), (m,)."""
         chance = np.zeros(len(x))
         for constraint in self.constraints:
-            chance += constraint.log_probability(x)
+            chance += self.caution * constraint.log_probability(x)
         if self.cost is None:
             return chance
         mean, std = self.cost.predict(x)
@@ -78,8 +81,8 @@ class Merit:
         chance, by_chance = 0.0, np.zeros_like(x)
         for constraint in self.constraints:
             log_probability, slope = constraint.with_gradient(x)
-            chance += log_probability
-            by_chance += slope
+            chance += self.caution * log_probability
+            by_chance += self.caution * slope
         if self.cost is None:
             return chance, by_chance
         mean, std, by_mean, by_std = self.cost.predict_with_gradient(x)

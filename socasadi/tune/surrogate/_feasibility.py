@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from ._evidence import KernelMatrix, descend, import_gpy, kernel_bounds
 from ._posterior import Hyperparameters, Posterior
-from ._prior import lengthscale_penalty
-
-_START_VARIANCE = 4.0
+from ._prior import LIKELY_VARIANCE, lengthscale_penalty, variance_penalty
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +25,10 @@ class _Given:
 
 
 class _Loss:
-    """Minus the log posterior density of z = log variance, log lengthscales, given which points failed."""
+    """Minus the log posterior density of z = log variance, log lengthscales, given which points failed.
+
+    The latent value has a mean of the same variance, which all points share: how much of the box fails is not known.
+    """
 
     def __init__(self, points: NDArray, failed: NDArray, kernel: str) -> None:
         gpy = import_gpy()
@@ -37,7 +38,7 @@ class _Loss:
         self.inference = gpy.inference.latent_function_inference.Laplace()
 
     def infer(self, z: NDArray) -> tuple[object, float, dict[str, NDArray]]:
-        kernel = _Given(self.matrix(z))
+        kernel = _Given(self.matrix(z) + np.exp(z[0]))
         posterior, evidence, by = self.inference.inference(kernel, self.points, self.likelihood, self.labels)
         return posterior, float(np.squeeze(evidence)), by
 
@@ -47,16 +48,17 @@ class _Loss:
         except np.linalg.LinAlgError:
             return 1e10, np.zeros_like(z)
         gradient = -self.matrix.gradient(by["dL_dK"])
-        penalty, slope = lengthscale_penalty(z[1:])
-        gradient[1:] += slope
-        return penalty - evidence, gradient
+        gradient[0] -= np.exp(z[0]) * by["dL_dK"].sum()
+        of_scales, by_scales = lengthscale_penalty(z[1:])
+        of_variance, by_variance = variance_penalty(z[:1])
+        return of_variance + of_scales - evidence, gradient + np.concatenate([by_variance, by_scales])
 
 
 def classify(points: NDArray, failed: NDArray, kernel: str) -> Posterior:
     """Return the process g of which an experiment fails with probability Phi(g) (Rasmussen and Williams 2006, ch. 3).
 
     Where its mean is m and its deviation s, the probability of failure is Phi(m / sqrt(1 + s^2)), eq. 3.82. Far from
-    all data it is a half.
+    all data it is about the share of failures among them.
 
     Parameters
     ----------
@@ -67,10 +69,11 @@ def classify(points: NDArray, failed: NDArray, kernel: str) -> Posterior:
     """
     loss = _Loss(points, failed, kernel)
     d = points.shape[1]
-    start = np.concatenate([[np.log(_START_VARIANCE)], np.full(d, 0.5 * np.log(d))])
+    start = np.concatenate([[np.log(LIKELY_VARIANCE)], np.full(d, 0.5 * np.log(d))])
     best = descend(loss, [start], kernel_bounds(d), iterations=40)
     posterior, _, _ = loss.infer(best)
-    hyper = Hyperparameters(kernel, 0.0, float(np.exp(best[0])), 0.0, np.exp(best[1:]))
+    variance = float(np.exp(best[0]))
+    hyper = Hyperparameters(kernel, 0.0, variance, 0.0, np.exp(best[1:]), common=variance)
     # The inverse is symmetric to rounding only, and its factor must exist.
     inverse = 0.5 * (posterior.woodbury_inv + posterior.woodbury_inv.T)  # pyright: ignore[reportAttributeAccessIssue]
     values, vectors = np.linalg.eigh(inverse)

@@ -17,7 +17,8 @@ class Hyperparameters:
 
     `mean` is the constant mean, `variance` that of the kernel of all coordinates, `noise` the variance of the
     observation noise, `lengthscales` (d,), `additive` the variance of the sum of one-dimensional kernels, 0 without
-    one; `warp` is None where the inputs are not warped.
+    one; `warp` is None where the inputs are not warped; `common` is the variance of a constant that all points share (a
+    mean that is not known).
     """
 
     kernel: str
@@ -27,11 +28,12 @@ class Hyperparameters:
     lengthscales: NDArray
     additive: float = 0.0
     warp: Warp | None = None
+    common: float = 0.0
 
     @property
     def prior_variance(self) -> float:
         """Variance of the process before any data."""
-        return self.variance + self.additive
+        return self.variance + self.additive + self.common
 
     def scaled(self, x: NDArray) -> NDArray:
         """Points of the unit cube, warped and in lengthscales."""
@@ -40,7 +42,7 @@ class Hyperparameters:
     def covariance(self, x: NDArray, z: NDArray) -> NDArray:
         """The kernel matrix (m, k) of points x (m, d) and z (k, d)."""
         shape = kernel_named(self.kernel)
-        return kernel_matrix(shape, self.scaled(x), self.scaled(z), self.variance, self.additive)
+        return kernel_matrix(shape, self.scaled(x), self.scaled(z), self.variance, self.additive) + self.common
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +87,7 @@ class Posterior:
         hyper = self.hyperparameters
         step = hyper.scaled(x) - self._scaled
         joint, each, slopes = kernel_parts(kernel_named(hyper.kernel), step, hyper.variance, hyper.additive)
-        k = joint + each
+        k = joint + each + hyper.common
         half = self.root @ k
         variance = hyper.prior_variance - half @ half
         gradients = -np.vstack((self.alpha.T, half @ self.root)) @ (slopes * step) / hyper.lengthscales

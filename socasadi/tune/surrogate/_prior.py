@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 _SCALE = math.sqrt(3.0)
 _APART = 0.5
 _BALANCE = 2.0
+LIKELY_VARIANCE = 30.0
 
 
 def lengthscale_penalty(logs: NDArray, akin: bool = True) -> tuple[float, NDArray]:
@@ -48,3 +49,13 @@ def balance_penalty(logs: NDArray) -> tuple[float, NDArray]:
     slope[0] = standard / _BALANCE
     slope[-1] = -slope[0]
     return 0.5 * float(standard**2), slope
+
+
+def variance_penalty(logs: NDArray) -> tuple[float, NDArray]:
+    """Of a classifier's latent variance (1): log-normal about 30, with a deviation of 1.
+
+    An experiment fails for a reason: the same one mostly fails again, and its neighbours, too. With a small variance an
+    outcome would be chance instead, and a success among failures no place to go on from.
+    """
+    apart = logs - math.log(LIKELY_VARIANCE)
+    return 0.5 * float(apart @ apart), apart
