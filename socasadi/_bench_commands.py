@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ._terminal import RunFolder, StudyFile, distance, out, outcome, print_theta, table
+from ._terminal import RunFolder, StudyFile, StudyScript, distance, opened, out, outcome, print_theta, table
 from .campaign import (
     Asked,
     Bench,
@@ -22,14 +22,9 @@ from .campaign import (
     read_recording,
     recognise,
 )
-from .campaign.store import read_settings
 from .codegen import c_compiler
 from .export import ExportError
 from .mpc import DesignError, check_real
-
-StudyScript = Annotated[
-    Path | None, typer.Option("--study", help="Its script, where a part of the study is of your own making.")
-]
 
 _DOUBTFUL = 0.1
 """Share of the input bound from which on a recording's inputs are told to be far from its controller's."""
@@ -81,10 +76,10 @@ def ask(
     if count < 1:
         raise RunError(f"--count is at least 1, not {count}")
     if pending:
-        result = _result(folder, script)
+        result = opened(folder, script)
         _print_pending(result, as_json)
         return
-    bench = Bench.of(_result(folder, script).study, folder)
+    bench = Bench.of(opened(folder, script).study, folder)
     _check_compiler(bench.real)
     given: list[Asked] = []
     with _campaign(folder, script) as campaign:
@@ -96,7 +91,7 @@ def ask(
             except (DesignError, ExportError) as error:
                 campaign.tell(asked.number, failed=f"{type(error).__name__}: {error}")
                 if not as_json:
-                    out.print(f"trial {asked.number} has failed without being flown: {error}\n", markup=False)
+                    out.print(f"trial {asked.number} has failed without being flown: {error}\n")
             else:
                 given.append(asked)
         if not given:
@@ -176,24 +171,8 @@ def _recorded(campaign: Campaign, number: int, path: Path, anyway: bool) -> Epis
 
 
 def _campaign(folder: Path, script: Path | None) -> Campaign:
-    study = _result(folder, script).study
+    study = opened(folder, script).study
     return Campaign.open(folder) if script is None else Campaign(study, folder, resume=True)
-
-
-def _result(folder: Path, script: Path | None) -> Result:
-    """The run, its study from its folder or from its script."""
-    if script is None:
-        try:
-            return Result.open(folder)
-        except RunError as error:
-            if "can only be made by the study script" in str(error):
-                raise RunError(f"{error}: name it by --study") from error
-            raise
-    if not folder.is_dir():
-        raise RunError(f"there is no run folder {folder}")
-    settings = read_settings(folder)
-    kept = {name: settings[name] for name in ("iterations", "seed", "verifications") if name in settings}
-    return Result(replace(load_study(script), **kept), folder)
 
 
 def _check_compiler(real: str) -> None:
@@ -228,7 +207,7 @@ def _print_asked(bench: Bench, asked: Asked, trials: int) -> None:
     if asked.give_up is not None:
         lines["may end"] = f"early, once its J is above {asked.give_up:.4g}: tell the recording until then"
     for name, told in lines.items():
-        out.print(f"{name:11} {told}", markup=False)
+        out.print(f"{name:11} {told}")
 
 
 def _print_pending(result: Result, as_json: bool) -> None:
@@ -263,7 +242,7 @@ def _print_told(campaign: Campaign, told: Trial, before: Trial | None) -> None:
             value = told.measured[limit.name]
             verdict = "kept" if value <= limit.limit else f"NOT kept: at most {limit.limit:g}"
             line += f"\n            {limit.name} {value:.4g} {limit.unit}".rstrip() + f", {verdict}"
-    out.print(f"{f'trial {told.number}':11} {line}", markup=False)
+    out.print(f"{f'trial {told.number}':11} {line}")
     if (best := campaign.best) is not None:
         newly = ", as told now" if best.number == told.number else ""
         was = f" (before: {before.J:.5g}, trial {before.number})" if newly and before is not None else ""
@@ -281,7 +260,7 @@ def _print_told(campaign: Campaign, told: Trial, before: Trial | None) -> None:
 
 def _print_taken_back(campaign: Campaign, trial: Trial) -> None:
     folder = _quoted(campaign.folder)
-    out.print(f"{f'trial {trial.number}':11} was told as {outcome(trial)}; that is taken back", markup=False)
+    out.print(f"{f'trial {trial.number}':11} was told as {outcome(trial)}; that is taken back")
     out.print(f"run         {_left(len(campaign.trials), len(campaign.pending), campaign.study)}")
     following = f"socasadi tell {folder} --trial {trial.number} --csv recording.csv"
     out.print(f"next        {following if trial.by_hand else 'socasadi run STUDY --resume flies it again'}")

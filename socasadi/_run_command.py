@@ -12,7 +12,7 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
 
-from ._terminal import StudyFile, best_of, found, out, print_chosen, print_verdicts, replay, spared
+from ._terminal import StudyFile, best_of, estimated, found, out, print_chosen, print_verdicts, replay, spared
 from .campaign import (
     Assessment,
     Progress,
@@ -111,7 +111,7 @@ def _progress(title: str):
     if not out.is_terminal:
         yield lambda progress: out.print(progress_line(progress))
         return
-    with Bar(BarColumn(12), MofNCompleteColumn(), TextColumn("{task.description}"), console=out) as bar:
+    with Bar(BarColumn(12), MofNCompleteColumn(), TextColumn("{task.description}", markup=False), console=out) as bar:
         task = bar.add_task("", total=None)
 
         def report(progress: Progress) -> None:
@@ -125,12 +125,8 @@ def _progress(title: str):
 def _summary(result: Result, baseline: Result, assessment: Assessment) -> None:
     counts = {outcome: sum(trial.outcome == outcome for trial in result.trials) for outcome in ("failed", "cut")}
     out.print(f"\nbest of {len(result.trials)} trials ({_counted(counts)}): {found(result)}")
-    if (estimate := result.best_estimated) is not None:
-        trial = result.trials[estimate.index]
-        out.print(
-            f"best without noise, as estimated: J = {estimate.cost:.4g} (90 %: {estimate.low:.4g} to "
-            f"{estimate.high:.4g}), trial {trial.number}"
-        )
+    if told := estimated(result):
+        out.print(told)
     if best_of(baseline) is not None:
         out.print(f"best of {len(baseline.trials)} Sobol points: {found(baseline)}")
     if told := spared(result):

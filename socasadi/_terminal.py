@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -10,14 +11,37 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from .campaign import Asked, Result, RunError, Study, Trial, Units, Verdict, clock
+from .campaign import Asked, Result, RunError, Study, Trial, Units, Verdict, clock, load_study
+from .campaign.store import compare_settings, read_settings
 from .export import NotBuiltError, build_and_replay
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="Python file that defines `study`.")]
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")]
+StudyScript = Annotated[
+    Path | None, typer.Option("--study", help="Its script, where a part of the study is of your own making.")
+]
 
 # A file or a pipe has no width; a table must not be folded for it.
-out = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 120)
+# Nothing is markup: what a robot says when it fails, or the name of a folder, may hold brackets.
+out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 120)
+
+
+def opened(folder: Path, script: Path | None) -> Result:
+    """The run, its study from its folder or from its script."""
+    if script is None:
+        try:
+            return Result.open(folder)
+        except RunError as error:
+            if "can only be made by the study script" in str(error):
+                raise RunError(f"{error}: name it by --study") from error
+            raise
+    if not folder.is_dir():
+        raise RunError(f"there is no run folder {folder}")
+    settings = read_settings(folder)
+    kept = {name: settings[name] for name in ("iterations", "seed", "verifications") if name in settings}
+    study = replace(load_study(script), **kept)
+    compare_settings(folder, study.settings)
+    return Result(study, folder)
 
 
 def table(*headings: str, left: tuple[str, ...] = (), title: str = "") -> Table:
@@ -38,7 +62,7 @@ def print_theta(study: Study, trial: Asked, title: str) -> None:
     """The entries of a theta by name, with their bounds."""
     listed = Table(box=None, show_header=False, title=title, title_justify="left", title_style="")
     for entry, value in zip(study.mpc.model.entries, trial.theta, strict=True):
-        bounds = f"\\[{entry.lower:g}, {entry.upper:g}]"
+        bounds = f"[{entry.lower:g}, {entry.upper:g}]"
         listed.add_row(f"  {entry.name}", f"{value:.5g}", entry.unit, bounds)
     out.print(listed)
 
@@ -62,6 +86,14 @@ def found(result: Result) -> str:
     for limit in result.study.limits:
         told.append(f"{limit.name} = {(best.measured or {})[limit.name]:.4g} {limit.unit}".rstrip())
     return ", ".join(told)
+
+
+def estimated(result: Result) -> str:
+    """The best trial without the luck of its noise, in a line; nothing before there is one."""
+    if (estimate := result.best_estimated) is None:
+        return ""
+    trial, between = result.trials[estimate.index], f"{estimate.low:.4g} to {estimate.high:.4g}"
+    return f"best without noise, as estimated: J = {estimate.cost:.4g} (90 %: {between}), trial {trial.number}"
 
 
 def outcome(trial: Trial) -> str:

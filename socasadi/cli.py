@@ -10,7 +10,21 @@ from rich.table import Table
 
 from ._bench_commands import ask, init, tell
 from ._run_command import run
-from ._terminal import RunFolder, best_of, distance, out, outcome, print_chosen, print_verdicts, replay, spared, table
+from ._terminal import (
+    RunFolder,
+    StudyScript,
+    best_of,
+    distance,
+    estimated,
+    opened,
+    out,
+    outcome,
+    print_chosen,
+    print_verdicts,
+    replay,
+    spared,
+    table,
+)
 from .campaign import (
     JournalError,
     Limit,
@@ -44,9 +58,10 @@ def show(
         Path | None,
         typer.Option("--csv", metavar="FILE", help="Write all trials there as CSV, with units; - prints them."),
     ] = None,
+    script: StudyScript = None,
 ) -> None:
     """Print what a run has found, or write its trials to a file."""
-    result = Result.open(run_folder)
+    result = opened(run_folder, script)
     if csv == Path("-"):
         print(trials_csv(result), end="")
         return
@@ -72,7 +87,9 @@ def show(
         most = ", ".join(f"{limit.name} {limit.limit:g} {limit.unit}".rstrip() for limit in study.limits)
         out.print(f"limits: {most}; ! is above its limit")
     for trial in result.taken_back:
-        out.print(f"taken back: trial {trial.number}, told as {outcome(trial)}", markup=False)
+        out.print(f"taken back: trial {trial.number}, told as {outcome(trial)}")
+    if told := estimated(result):
+        out.print(told)
     if verdicts := assessed(result):
         print_verdicts(study, verdicts)
     if best is not None:
@@ -85,11 +102,12 @@ def show(
 def plot(
     run_folder: RunFolder,
     trial: Annotated[int | None, typer.Option(help="Trial whose episode is drawn; the best by default.")] = None,
+    script: StudyScript = None,
 ) -> None:
     """Draw the figures of a run again."""
-    result = Result.open(run_folder)
+    result = opened(run_folder, script)
     beside = run_folder / "sobol"
-    baseline = Result.open(beside).trials if beside.is_dir() else None
+    baseline = Result(result.study, beside).trials if beside.is_dir() else None
     for file in save_figures(figures(result, baseline, trial), run_folder / "figures"):
         out.print(str(file))
 
@@ -101,9 +119,10 @@ def export(
     real: Annotated[str, typer.Option(help="What it computes in: double or float.")] = "double",
     solver: Annotated[str, typer.Option(help="QP solver: active-set or osqp.")] = "active-set",
     name: Annotated[str, typer.Option(help="Prefix of all that the C defines.")] = "controller",
+    script: StudyScript = None,
 ) -> None:
     """Write the best controller of a run as C, build it and replay its episode."""
-    Result.open(run_folder).export(folder, real=real, solver=solver, name=name)
+    opened(run_folder, script).export(folder, real=real, solver=solver, name=name)
     out.print(f"{folder}: {replay(folder)}")
 
 
@@ -111,10 +130,11 @@ def export(
 def emulate_(
     run_folder: RunFolder,
     real: Annotated[str, typer.Option(help="float (Cortex-M4F) or double (Cortex-M7).")] = "float",
+    script: StudyScript = None,
 ) -> None:
     """Fly the best controller of a run on an emulated microcontroller, and say what it costs there."""
     with out.status("flying with the controller on an emulated microcontroller"):
-        flown = emulate(Result.open(run_folder), real=real)  # pyright: ignore[reportArgumentType] (checked there)
+        flown = emulate(opened(run_folder, script), real=real)  # pyright: ignore[reportArgumentType] (checked there)
     footprint, worst = flown.footprint, flown.worst
     seconds = len(flown.episode.tension) * flown.episode.sample_time
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))

@@ -130,8 +130,8 @@ def test_two_people_bring_a_campaign_to_its_end_from_the_shell(at_the_bench, soc
 
     # Bob's next one goes wrong.
     assert asked(socasadi)[0]["trial"] == 3
-    said = socasadi("tell", "runs/study", "--trial", 3, "--failed", "cable 2 slipped off")
-    assert "trial 3     failed: cable 2 slipped off" in said
+    said = socasadi("tell", "runs/study", "--trial", 3, "--failed", "cable [2] slipped off [/dev/ttyUSB0]")
+    assert "trial 3     failed: cable [2] slipped off [/dev/ttyUSB0]" in said
 
     # Ann's log is in millimetres: refused, and nothing has happened.
     rows = [*csv.reader(Path(recording(first)).read_text().splitlines())]
@@ -169,7 +169,7 @@ def test_two_people_bring_a_campaign_to_its_end_from_the_shell(at_the_bench, soc
         told = next(one for one in result.trials if one.number == trial["trial"])
         assert told.outcome == "cut" or cost(trial) == told.J
     assert [trial.number for trial in result.trials] == [2, 3, 1, 5, 4, 6]
-    assert "cable 2 slipped off" in socasadi("show", "runs/study")
+    assert "failed: cable [2] slipped off [/dev/ttyUSB0]" in socasadi("show", "runs/study")
     if c_compiler():
         assert "largest difference from Python" in socasadi("export", "runs/study", "--out", "c")
 
@@ -334,6 +334,11 @@ def test_a_task_of_ones_own_takes_the_script_along(at_the_bench, socasadi):
     (trial,) = asked(socasadi, "--study", "study.py")
     said = socasadi("tell", "runs/study", "--trial", trial["trial"], "--cost", 3.0, "--study", "study.py")
     assert "1 of 4 trials told" in said
+    assert "name it by --study" in socasadi("show", "runs/study", refused=True)
+    assert "1 of 4 trials so far" in socasadi("show", "runs/study", "--study", "study.py")
+    assert "\n1,seed,done,3.0," in socasadi("show", "runs/study", "--csv", "-", "--study", "study.py")
+    Path("other.py").write_text(Path("study.py").read_text().replace("period=2.0", "period=3.0"))
+    assert "period" in socasadi("show", "runs/study", "--study", "other.py", refused=True)
 
 
 def test_an_ask_that_was_broken_off_is_made_whole(at_the_bench, socasadi):

@@ -230,7 +230,9 @@ class Belief:
 
 
 def noise_seen(trials: Sequence[Trial]) -> bool | None:
-    """Whether a point that was told more than one cost had different ones; None while there is no such point."""
+    """Whether costs have noise: it was told, or a point was told different ones; None while nothing says so or not."""
+    if any(trial.deviation for trial in trials):
+        return True
     if not (costs := _repeated(trials)):
         return None
     return any(np.ptp(told) > 1e-10 * np.abs(told).max() for told in costs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -299,8 +300,8 @@ class Optimizer:
         told = len(self.trials)
         count = told + len(waiting)
         self._timings = Timings()
-        if count < len(self._initial):
-            return self._initial[count]
+        if (start := self._start_left(waiting)) is not None:
+            return start
         if count < self._seed_points or not any(trial.cost is not None for trial in self.trials):
             return self._sobol[count - len(self._initial)]
         import_gpy()
@@ -313,6 +314,15 @@ class Optimizer:
             theta = self._maximise(belief, units.reshape(-1, self.space.dimension))
         self._timings = Timings(fitted - start, time.perf_counter() - fitted)
         return theta
+
+    def _start_left(self, waiting: NDArray) -> NDArray | None:
+        """The first of the start points that is neither told nor pending."""
+        met = collections.Counter(theta.tobytes() for theta in (*(trial.theta for trial in self.trials), *waiting))
+        for theta in self._initial:
+            if not met[theta.tobytes()]:
+                return theta
+            met[theta.tobytes()] -= 1
+        return None
 
     def _maximise(self, belief: Belief, waiting: NDArray) -> NDArray:
         """The theta of most merit; `waiting` are the pending ones in the unit cube."""

@@ -111,7 +111,7 @@ class TestDamage:
         with pytest.raises(JournalError, match="a checksum does not match: 2"):
             content(path)
 
-    def test_a_broken_record_is_said_when_it_is_read(self, journal, path):
+    def test_a_broken_record_is_said_when_it_is_read_and_before_anything_is_added(self, journal, path):
         path.write_bytes(journal)
         with sqlite3.connect(path) as database:
             (blob,) = database.execute("SELECT episode FROM trial WHERE number = 2").fetchone()
@@ -119,6 +119,8 @@ class TestDamage:
             database.execute("UPDATE trial SET episode = ? WHERE number = 2", (broken,))
         with Journal(path) as journal_, pytest.raises(JournalError, match="damaged"):
             journal_.episode(2)
+        with pytest.raises(JournalError, match="damaged"):
+            Journal(path, writer=True)
 
     @pytest.mark.parametrize("foreign", ["text", "letters", "about"])
     def test_what_is_no_journal_is_refused_and_left_alone(self, toy_study, tmp_path, foreign):

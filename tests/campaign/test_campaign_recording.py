@@ -188,6 +188,10 @@ FAULTS = {
         r"line 24: the task of 1 s has 21 rows, this recording 22; remove",
     ),
     "no number": (put(5, "y2", "n/a"), "line 5: y2 is 'n/a', which is no finite number"),
+    "a decimal comma": (
+        lambda rows: rows[4].__setitem__(slice(1, 2), ["0", "0123"]),
+        "line 5: 9 cells under 8 headings; a number takes a point, not a comma",
+    ),
     "NaN": (put(5, "y2", "nan"), "line 5: y2 is 'nan', which is no finite number"),
     "an empty cell": (put(6, "u1", ""), "line 6: u1 is empty"),
     "an input beyond its bounds": (

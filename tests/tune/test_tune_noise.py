@@ -80,6 +80,14 @@ def test_what_came_out_the_same_twice_is_asked_no_more():
     assert repeats(told(search)) == 1
 
 
+def test_equal_costs_of_a_known_deviation_are_not_taken_for_exact():
+    search = Optimizer(cube(2), seed=0, seed_points=4)
+    for theta in [*np.random.default_rng(0).random((12, 2)), [0.4, 0.4], [0.4, 0.4]]:
+        search.tell(theta, round(3 * quadratic(theta)), deviation=1.0)
+    estimate = search.best_estimated
+    assert estimate.high - estimate.low > 0.3  # of one observation 3.3
+
+
 @pytest.mark.parametrize("transform", ["none", "log", "power"])
 def test_a_cost_of_large_deviation_moves_the_model_less_than_an_exact_one(transform):
     def predicted(deviation, cost):

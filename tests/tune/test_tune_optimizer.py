@@ -251,6 +251,17 @@ def test_start_points_are_asked_even_beyond_the_number_of_seed_points():
     np.testing.assert_array_equal(told(search), first)
 
 
+@pytest.mark.parametrize("seed_points", [1, 8])
+def test_start_points_are_asked_whatever_else_was_told_before(seed_points):
+    first = np.random.default_rng(0).random((3, 2))
+    search = Optimizer(cube(2), seed=0, seed_points=seed_points, initial=first)
+    for theta in ([0.9, 0.9], first[1], [0.8, 0.8]):
+        search.tell(theta, sphere(theta))
+    np.testing.assert_array_equal(search.ask(), first[0])
+    np.testing.assert_array_equal(search.ask(pending=[first[0]]), first[2])
+    assert not np.any(np.all(search.ask(pending=first[[0, 2]]) == first, axis=1))
+
+
 def test_timings_are_those_of_the_last_ask():
     search = run(Optimizer(cube(2), seed=0, seed_points=3), sphere, 3)
     assert (search.timings.fit, search.timings.acquisition) == (0.0, 0.0)

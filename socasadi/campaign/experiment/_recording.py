@@ -144,7 +144,14 @@ def _table(path: Path) -> tuple[list[str], list[_Row]]:
         if sign in heading and "," not in heading:
             raise RecordingError(f"{path} has {name} between its columns: save it with commas, and points in numbers")
     rows = [(number, _cells(path, number, line)) for number, line in lines]
-    return rows[0][1], rows[1:]
+    headings = rows[0][1]
+    for number, cells in rows[1:]:
+        if any(cells[len(headings) :]):
+            raise RecordingError(
+                f"{path}, line {number}: {len(cells)} cells under {len(headings)} headings; a number takes a point, "
+                "not a comma"
+            )
+    return headings, rows[1:]
 
 
 def _cells(path: Path, number: int, line: str) -> list[str]:

@@ -53,7 +53,7 @@ def write_settings(folder: Path, settings: dict[str, Any]) -> None:
     settle(scratch, settings_path(folder))
 
 
-def compare_settings(folder: Path, settings: dict[str, Any], may_differ: tuple[str, ...]) -> None:
+def compare_settings(folder: Path, settings: dict[str, Any], may_differ: tuple[str, ...] = ()) -> None:
     """RunError, naming what changed, when ``folder`` holds other settings; ``may_differ`` are names at the top."""
     changed = [line for line in differences(read_settings(folder), settings) if line.split(" ")[0] not in may_differ]
     if changed:

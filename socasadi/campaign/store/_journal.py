@@ -1,8 +1,8 @@
 import contextlib
-import fcntl
 import os
+import shutil
 import sqlite3
-import time
+import tempfile
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -11,11 +11,13 @@ from zipfile import BadZipFile
 
 from ..experiment import Episode
 from ._folder import settle
+from ._lock import LockedError, lock, unlock
 from ._row import (
     FLIGHT_COLUMNS,
     SCHEMA,
     TABLES,
     TRIAL_COLUMNS,
+    check_record,
     flight_of,
     flight_row,
     record_of,
@@ -29,10 +31,6 @@ _DAMAGE = (
     *(sqlite3.DatabaseError, ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError),
     *(OverflowError, MemoryError, NotImplementedError, zlib.error, BadZipFile),
 )
-
-
-# s for which a writer waits for another: what a colleague asks or tells is soon done.
-_PATIENCE = 3.0
 
 
 class JournalError(RuntimeError):
@@ -61,11 +59,15 @@ class Journal:
 
     def __init__(self, path: Path, *, writer: bool = False, create: bool = False) -> None:
         self.path = path
-        self._lock = _lock(path) if writer else None
+        self._closing = contextlib.ExitStack()
         try:
+            if writer:
+                self._closing.callback(unlock, lock(path.with_name("lock")))
             self._database = self._open(writer, create)
+        except LockedError as error:
+            raise JournalError(f"{path.parent} is being written by process {error}; wait until it is done") from None
         except BaseException:
-            self._unlock()
+            self._closing.close()
             raise
 
     def _open(self, writer: bool, create: bool) -> sqlite3.Connection:
@@ -80,34 +82,45 @@ class Journal:
             except (sqlite3.Error, OSError) as error:
                 raise self._unwritable(error) from error
         with self._reading():
-            mode = "rw" if writer else _read_mode(self.path)
-            database = sqlite3.connect(f"{self.path.resolve().as_uri()}?mode={mode}", uri=True)
-            try:
-                database.execute("PRAGMA synchronous=FULL")
-                database.execute("PRAGMA wal_autocheckpoint=1")
-                (state,) = database.execute("PRAGMA quick_check").fetchone()
-                if state != "ok":
-                    raise sqlite3.DatabaseError(state.splitlines()[0])
-                (schema,) = database.execute("SELECT schema FROM about").fetchone()
-                if schema != SCHEMA:
-                    raise JournalError(
-                        f"{self.path} has schema version {schema}, this socasadi reads version {SCHEMA}: read it with "
-                        "the socasadi that wrote it (study.json says which), or start anew in another folder"
-                    )
-            except BaseException:
-                database.close()
-                raise
+            database = sqlite3.connect(self._uri(writer), uri=True)
+            self._closing.callback(database.close)
+            database.execute("PRAGMA synchronous=FULL")
+            database.execute("PRAGMA wal_autocheckpoint=1")
+            (state,) = database.execute("PRAGMA quick_check").fetchone()
+            if state != "ok":
+                raise sqlite3.DatabaseError(state.splitlines()[0])
+            (schema,) = database.execute("SELECT schema FROM about").fetchone()
+            if schema != SCHEMA:
+                raise JournalError(
+                    f"{self.path} has schema version {schema}, this socasadi reads version {SCHEMA}: read it with "
+                    "the socasadi that wrote it (study.json says which), or start anew in another folder"
+                )
+            if writer:  # nothing is added to what is damaged
+                for table in ("trial", "taken_back", "flight"):
+                    query = f"SELECT episode, record_checksum FROM {table} WHERE episode IS NOT NULL"
+                    for blob, checksum in database.execute(query):
+                        check_record(blob, checksum)
         return database
+
+    def _uri(self, writer: bool) -> str:
+        """How SQLite opens the file, also for a reader who may not write anything."""
+        path = self.path.resolve()
+        if writer or (os.access(path, os.W_OK) and os.access(path.parent, os.W_OK)):
+            return f"{path.as_uri()}?mode=rw"  # which tidies SQLite's side files away
+        changes, index = (path.with_name(path.name + end) for end in ("-wal", "-shm"))
+        if index.exists():
+            return f"{path.as_uri()}?mode=ro"
+        if not changes.exists():
+            return f"{path.as_uri()}?mode=ro&immutable=1"
+        # A writer was killed, and left changes that SQLite cannot read without making their index.
+        folder = Path(self._closing.enter_context(tempfile.TemporaryDirectory()))
+        for file in (path, changes):
+            shutil.copyfile(file, folder / file.name)
+        return f"{(folder / path.name).as_uri()}?mode=rw"
 
     def close(self) -> None:
         """Close the file and let others write it."""
-        self._database.close()
-        self._unlock()
-
-    def _unlock(self) -> None:
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        self._closing.close()
 
     def __enter__(self) -> "Journal":
         return self
@@ -237,39 +250,10 @@ def _make(path: Path) -> None:
     scratch = path.with_name(f"{path.name}.new")
     for left in path.parent.glob(f"{scratch.name}*"):
         left.unlink()
+    os.close(os.open(scratch, os.O_RDWR | os.O_CREAT, 0o666))  # SQLite would keep others of the group out
     database = sqlite3.connect(scratch)
     try:
         database.executescript(f"PRAGMA journal_mode=WAL; BEGIN; {TABLES} INSERT INTO about VALUES ({SCHEMA}); COMMIT;")
     finally:
         database.close()
     settle(scratch, path)
-
-
-def _read_mode(path: Path) -> str:
-    """A reader that may write tidies SQLite's side files away; on a medium that it may not, there are none."""
-    return "rw" if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK) else "ro&immutable=1"
-
-
-def _taken(handle: int) -> bool:
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
-
-
-def _lock(path: Path) -> int:
-    """Hold the folder's lock for as long as the file stays open; the kernel lets go of it when the process dies."""
-    handle = os.open(path.with_name("lock"), os.O_RDWR | os.O_CREAT, 0o644)
-    deadline = time.monotonic() + _PATIENCE
-    while not _taken(handle):
-        if time.monotonic() > deadline:
-            holder = os.read(handle, 32).decode(errors="replace").strip() or "unknown"
-            os.close(handle)
-            raise JournalError(f"{path.parent} is being written by process {holder}; wait until it is done")
-        time.sleep(0.1)
-    # On a full disk the name is missing, not the lock.
-    with contextlib.suppress(OSError):
-        os.ftruncate(handle, 0)
-        os.write(handle, str(os.getpid()).encode())
-    return handle

@@ -114,9 +114,14 @@ def flight_of(values: tuple[Any, ...]) -> Flight:
 
 def record_of(blob: bytes, checksum: int) -> Episode:
     """The record in a row."""
+    check_record(blob, checksum)
+    return unpack(blob)
+
+
+def check_record(blob: bytes, checksum: int) -> None:
+    """ValueError unless the bytes of a record are those that were stored."""
     if zlib.crc32(blob) != checksum:
         raise ValueError("a record does not match its checksum")
-    return unpack(blob)
 
 
 def _with_checksums(row: dict[str, Any], episode: Episode | None) -> dict[str, Any]:
