@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import collections
-import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
@@ -12,17 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
-from ._belief import Belief, Believer, Start, last_full_fit, noise_seen
-from ._search import Estimate, History, Timings, Trial, check_seed, keeps_limits
+from ._belief import Belief, Believer, Start, last_full_fit
+from ._choice import Chooser
+from ._search import Estimate, History, Timings, Trial, check_seed
 from ._sobol import SobolPoints
 from ._space import Space
-from .acquisition import Constraint, Merit, acquisition_named, maximise
-from .surrogate import FitSettings, Posterior, import_gpy, transform_named
-
-_INCUMBENTS = 5
-_FANTASIES = 8
-_HIDDEN_WORLDS = 16
-_FIRST_REPEAT = 20
+from .acquisition import acquisition_named
+from .surrogate import FitSettings, import_gpy, transform_named
 
 
 class Optimizer:
@@ -119,7 +114,6 @@ class Optimizer:
         self._seed = check_seed(seed)
         self._seed_points = _count("seed_points", seed_points)
         self._initial = [space.check(theta) for theta in initial]
-        self._acquisition = acquisition_named(acquisition)
         self._transform = transform_named(transform)
         self._history = History(space, limits)
         self._believer = Believer(
@@ -130,10 +124,10 @@ class Optimizer:
             _count("active_set", active_set),
             self._seed,
         )
-        self._admissible = admissible
-        self._repeat = repeat
+        chosen = acquisition_named(acquisition)
+        self._chooser = Chooser(space, chosen, self._history.limits, admissible, repeat, self._seed)
         for theta in self._initial:
-            if not self._may_ask(theta):
+            if not self._chooser.may_ask(theta):
                 raise ValueError(f"the start point {theta.tolist()} does not keep the conditions: leave it out")
         self._sobol = SobolPoints(space, self._seed, admissible)
         self._timings = Timings()
@@ -191,7 +185,7 @@ class Optimizer:
         belief = self._believe()
         if self._estimate is None or self._estimate[0] is not belief:
             with threadpool_limits(1):
-                self._estimate = (belief, self._believer.estimate(belief, self._keeps_limits))
+                self._estimate = (belief, self._believer.estimate(belief, self._chooser.keeps_limits))
         return self._estimate[1]
 
     @property
@@ -300,8 +294,8 @@ class Optimizer:
         told = len(self.trials)
         count = told + len(waiting)
         self._timings = Timings()
-        if (start := self._start_left(waiting)) is not None:
-            return start
+        if (first := self._start_left(waiting)) is not None:
+            return first
         if count < self._seed_points or not any(trial.cost is not None for trial in self.trials):
             return self._sobol[count - len(self._initial)]
         import_gpy()
@@ -311,7 +305,7 @@ class Optimizer:
         # Matrices this small only lose time on threads, and last bits with their number.
         with threadpool_limits(1):
             units = np.array([self.space.to_unit(theta) for theta in waiting])
-            theta = self._maximise(belief, units.reshape(-1, self.space.dimension))
+            theta = self._chooser.choose(belief, units.reshape(-1, self.space.dimension))
         self._timings = Timings(fitted - start, time.perf_counter() - fitted)
         return theta
 
@@ -323,74 +317,6 @@ class Optimizer:
                 return theta
             met[theta.tobytes()] -= 1
         return None
-
-    def _maximise(self, belief: Belief, waiting: NDArray) -> NDArray:
-        """The theta of most merit; `waiting` are the pending ones in the unit cube."""
-        rng = self._generator(1, len(waiting))
-        kept = belief.rows_that(self._keeps_limits)
-        constraints = self._constraints(belief)
-        order = np.argsort(belief.data.targets, kind="stable")
-        if len(kept):
-            order = kept[np.argsort(belief.data.targets[kept], kind="stable")]
-            cost, best = self._worlds(belief, kept, waiting, _likely(waiting, constraints), rng)
-            merit = Merit(self._acquisition, cost, best, constraints, 1.0 + self._lost_in_a_row())
-        else:
-            merit = Merit(self._acquisition, None, np.zeros(1), constraints)
-        incumbents = belief.data.points[order[:_INCUMBENTS]]
-        taken = np.vstack([belief.units, waiting])
-        if may_repeat := self._repeat and len(kept) and not len(waiting) and noise_seen(self.trials) is not False:
-            theta = self.trials[belief.data.rows[order[0]]].theta
-            if _is_time_to_repeat(len(self.trials)) and self._may_ask(theta):
-                return theta
-        unit, value = maximise(merit, taken, incumbents, rng, lambda x: self._may_ask(self.space.from_unit(x)))
-        if may_repeat:
-            again = merit(belief.data.points[kept])
-            theta = self.trials[belief.data.rows[kept[again.argmax()]]].theta
-            if again.max() > value and self._may_ask(theta):
-                return theta
-        return self.space.from_unit(unit)
-
-    def _worlds(
-        self, belief: Belief, kept: NDArray, waiting: NDArray, likely: NDArray, rng: np.random.Generator
-    ) -> tuple[Posterior, NDArray]:
-        """The cost's process and the best in each world of what is not known: costs to come, and noise.
-
-        Of the pending points only those that are `likely` to keep the constraints may be the best.
-        """
-        if self._acquisition.noisy:
-            cost = belief.hidden(waiting, _HIDDEN_WORLDS, rng)
-            rivals = np.vstack([belief.data.points[kept], likely])
-            return cost, cost.predict(rivals)[0].min(axis=0)
-        best = belief.data.targets[kept].min()
-        if self._acquisition.alternating:
-            mean, std = belief.cost.predict(belief.data.points[kept])
-            if (len(self.trials) + len(waiting)) % 2:
-                best = mean.min()
-            elif noise_seen(self.trials):
-                best = (mean[:, 0] - std).min()
-        if not len(waiting):
-            return belief.cost, np.array([best])
-        cost = belief.imagined(waiting, _FANTASIES, rng)
-        return cost, np.vstack([cost.predict(likely)[0], np.full((1, _FANTASIES), best)]).min(axis=0)
-
-    def _keeps_limits(self, trial: Trial) -> bool:
-        return keeps_limits(trial, self._history.limits)
-
-    def _lost_in_a_row(self) -> int:
-        """How many of the last trials have failed or broken a limit, one after the other.
-
-        They say nothing of the cost, which therefore seems worth a try wherever they were; so the chance of success
-        counts the more, the longer there is none.
-        """
-        lost = (trial.at_least is None and not self._keeps_limits(trial) for trial in reversed(self.trials))
-        return sum(itertools.takewhile(bool, lost))
-
-    def _may_ask(self, theta: NDArray) -> bool:
-        return self._admissible is None or bool(self._admissible(theta))
-
-    def _constraints(self, belief: Belief) -> list[Constraint]:
-        found = [Constraint(belief.failure, 0.0, 1.0)] if belief.failure is not None else []
-        return found + [Constraint(posterior, limit) for posterior, limit in belief.limited]
 
     def _believe(self) -> Belief:
         """What the told trials say: fitted once for each number of them."""
@@ -410,22 +336,6 @@ class Optimizer:
             at_hand = known is not None and len(known.trials) == full
             self._full = (full, known.found if known and at_hand else self._believer.cost(before, None)[2])
         return self._full[1]
-
-    def _generator(self, *purpose: int) -> np.random.Generator:
-        return np.random.default_rng([self._seed, len(self.trials), *purpose])
-
-
-def _likely(points: NDArray, constraints: Sequence[Constraint]) -> NDArray:
-    """Those of the points (m, d) that keep the constraints with a probability of a half or more."""
-    if not len(points) or not constraints:
-        return points
-    chance = np.sum([constraint.log_probability(points) for constraint in constraints], axis=0)
-    return points[chance >= np.log(0.5)]
-
-
-def _is_time_to_repeat(told: int) -> bool:
-    """Whether the best is asked again to see the noise: after 20, 40, 80, ... trials."""
-    return told >= _FIRST_REPEAT and told % _FIRST_REPEAT == 0 and (told // _FIRST_REPEAT).bit_count() == 1
 
 
 def _count(name: str, value: int) -> int:
