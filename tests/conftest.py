@@ -1,3 +1,4 @@
+import signal
 from dataclasses import dataclass
 from math import inf
 
@@ -5,6 +6,9 @@ import numpy as np
 import pytest
 
 from socasadi import Circle, LinearMPC, Modal, Study
+
+# A shell that runs the tests in its background has it ignored, in them and in all that they start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class ToyPlant:
