@@ -178,8 +178,11 @@ def test_a_start_that_was_killed_leaves_nothing_in_the_way(toy_study, tmp_path):
         assert [trial.J for trial in again.trials] == [trial.J for trial in whole.trials]
     folder = tmp_path / "settings missing"
     folder.mkdir()
-    Journal(folder / "journal.sqlite", create=True).close()
-    assert len(replace(toy_study, iterations=0).run(folder, resume=True, progress=None).trials) == 6
+    with Journal(folder / "journal.sqlite", create=True):
+        shutil.copytree(folder, open_ := tmp_path / "settings missing, journal open")
+    assert {"journal.sqlite-wal", "journal.sqlite-shm"} <= {file.name for file in open_.iterdir()}
+    for each in (folder, open_):
+        assert len(replace(toy_study, iterations=0).run(each, resume=True, progress=None).trials) == 6
 
 
 def test_any_sqlite_reads_it_and_its_schema_explains_it(toy_study, tmp_path):

@@ -62,7 +62,8 @@ def compare_settings(folder: Path, settings: dict[str, Any], may_differ: tuple[s
 
 def begun(folder: Path) -> bool:
     """Whether ``folder`` holds anything but what a start that was killed left behind."""
-    left = {"lock", *(f"journal.sqlite{end}" for end in ("", ".new", ".new-wal", ".new-shm")), "study.json.new"}
+    left = {"lock", "study.json.new"}
+    left |= {f"journal.sqlite{new}{end}" for new in ("", ".new") for end in ("", "-wal", "-shm")}
     return folder.is_dir() and not {file.name for file in folder.iterdir()} <= left
 
 
