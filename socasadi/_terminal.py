@@ -1,4 +1,4 @@
-"""How the command prints."""
+"""What the commands share: how they open a run, and how they print."""
 
 import sys
 from collections.abc import Mapping

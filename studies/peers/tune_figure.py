@@ -26,7 +26,7 @@ STYLES = {
 
 
 def draw(tables: Sequence[Table], path: Path) -> None:
-    """Medians as lines; quartiles as a band and, since bands of many overlap, as whiskers at the last evaluation."""
+    """Medians as lines; quartiles as whiskers at the last evaluation and, of ours alone, as a band: many overlap."""
     columns = min(4, len(tables) + 1)
     rows = -(-(len(tables) + 1) // columns)
     figure, grid = plt.subplots(rows, columns, figsize=(3.6 * columns, 3.2 * rows), layout="constrained", squeeze=False)
@@ -37,9 +37,11 @@ def draw(tables: Sequence[Table], path: Path) -> None:
             colour, dashes = STYLES[method]
             low, median, high = table.quartiles(method)[:, SEED_POINTS - 1 :]
             x = np.arange(SEED_POINTS, SEED_POINTS + len(median))
-            width, order = (2.4, 4) if method == "socasadi" else (1.3, 3)
+            ours = method == "socasadi"
+            width, order = (2.4, 4) if ours else (1.3, 3)
             axes.plot(x, median, color=colour, linestyle=dashes, linewidth=width, zorder=order)
-            axes.fill_between(x, low, high, color=colour, alpha=0.18 if method == "socasadi" else 0.07, linewidth=0)
+            if ours:
+                axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0)
             at = x[-1] + (1.5 + 1.3 * place) * len(x) / 90
             axes.plot([at, at], [low[-1], high[-1]], color=colour, linewidth=1.2)
             axes.plot(at, median[-1], "o", color=colour, markersize=3)
@@ -55,5 +57,5 @@ def draw(tables: Sequence[Table], path: Path) -> None:
         last.plot([], [], color=colour, linestyle=dashes, linewidth=2, label=METHODS[method].title)
     last.legend(loc="center", frameon=False, handlelength=4)
     path.parent.mkdir(exist_ok=True)
-    figure.savefig(path, dpi=150)
+    figure.savefig(path, dpi=110)
     plt.close(figure)
