@@ -7,8 +7,10 @@ import pytest
 
 from socasadi import Circle, LinearMPC, Modal, Study
 
-# A shell that runs the tests in its background has it ignored, in them and in all that they start.
-signal.signal(signal.SIGINT, signal.default_int_handler)
+
+def pytest_configure() -> None:
+    # A shell that runs the tests in its background has Ctrl-C ignored, in them and in all that they start.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class ToyPlant:
