@@ -12,7 +12,18 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
 
-from ._terminal import StudyFile, best_of, estimated, found, out, print_chosen, print_verdicts, replay, spared
+from ._terminal import (
+    StudyFile,
+    best_of,
+    estimated,
+    found,
+    out,
+    print_check,
+    print_chosen,
+    print_verdicts,
+    replay,
+    spared,
+)
 from .campaign import (
     Assessment,
     Progress,
@@ -26,6 +37,7 @@ from .campaign import (
     load_study,
     progress_line,
 )
+from .feasibility import check
 from .report import figures, save_figures
 
 
@@ -51,6 +63,7 @@ def run(
     study = replace(study, **{name: value for name, value in given.items() if value is not None})
     folder = folder or Path("runs") / script.stem
     out.print(f"{script}: {study.trials} trials of {study.task.duration:g} s, into {folder}")
+    print_check(check(study, quick=True).objections)
     began = time.monotonic()
     try:
         with interruptible(), ExitStack() as stack:

@@ -1,7 +1,8 @@
 """What the commands share: how they open a run, and how they print."""
 
 import sys
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +15,7 @@ from rich.table import Table
 from .campaign import Asked, Result, RunError, Study, Trial, Units, Verdict, clock, load_study
 from .campaign.store import compare_settings, read_settings
 from .export import NotBuiltError, build_and_replay
+from .feasibility import Finding
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="Python file that defines `study`.")]
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")]
@@ -54,8 +56,7 @@ def table(*headings: str, left: tuple[str, ...] = (), title: str = "") -> Table:
 
 def distance(study: Study) -> tuple[float, str]:
     """How many of the unit in which distances are printed are in one of the study's own, and that unit: mm for m."""
-    unit = Units.of(study.plant).output
-    return (1e3, "mm") if unit == "m" else (1.0, unit)
+    return Units.of(study.plant).shown
 
 
 def print_theta(study: Study, trial: Asked, title: str) -> None:
@@ -65,6 +66,19 @@ def print_theta(study: Study, trial: Asked, title: str) -> None:
         bounds = f"[{entry.lower:g}, {entry.upper:g}]"
         listed.add_row(f"  {entry.name}", f"{value:.5g}", entry.unit, bounds)
     out.print(listed)
+
+
+def print_check(findings: Sequence[Finding]) -> None:
+    """What a check found, a line or a few each, with what to change below."""
+    width = out.width if out.is_terminal else 120
+    for finding in findings:
+        head = f"  {finding.verdict:<10}  {finding.name:<16}  "
+        rest = " " * len(head)
+        style = {"infeasible": "bold red", "doubtful": "yellow", "unknown": "cyan"}.get(finding.verdict)
+        said = textwrap.fill(finding.says, width, initial_indent=head, subsequent_indent=rest)
+        out.print(said, style=style)
+        if finding.advice:
+            out.print(textwrap.fill(f"-> {finding.advice}", width, initial_indent=rest, subsequent_indent=rest + "   "))
 
 
 def best_of(result: Result) -> Trial | None:

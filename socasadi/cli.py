@@ -9,6 +9,7 @@ import typer
 from rich.table import Table
 
 from ._bench_commands import ask, init, tell
+from ._check_command import check_
 from ._run_command import run
 from ._terminal import (
     RunFolder,
@@ -47,6 +48,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+app.command(name="check")(check_)
 for command in (run, init, ask, tell):
     app.command()(command)
 

@@ -111,6 +111,12 @@ class SimulatedPlant:
         """Positions (n, 3), m, of ``n`` points evenly spaced along the rod now, base frame."""
         return self.rod.in_base_frame(self.rod.centreline(self._running()[: self.rod.dof], n))
 
+    @cached_property
+    def sensor(self) -> ca.Function:
+        """CasADi Function of the rod's state x (2 dof,) -> outputs (outputs,) without noise."""
+        x = ca.MX.sym("x", 2 * self.rod.dof)
+        return ca.Function("sensor", [x], [self._observe(x)[1]])
+
     def prepare(self) -> None:
         """Build and compile what a step needs, which the first step would do otherwise.
 
@@ -230,7 +236,7 @@ class SimulatedPlant:
         return Buffered(compiled(ca.Function("plant_step", arguments, [x_next, *self._observe(x_next)])))
 
     def __getstate__(self) -> dict[str, Any]:
-        rebuilt = ("_observe", "_advance")
+        rebuilt = ("sensor", "_observe", "_advance")
         return {name: value for name, value in self.__dict__.items() if name not in rebuilt}
 
 

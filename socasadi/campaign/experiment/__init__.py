@@ -15,7 +15,7 @@ from ._limits import (
 )
 from ._probe import probe
 from ._recognise import recognise
-from ._recording import RecordingError, Units, read_recording, resting_input, write_recording
+from ._recording import RecordingError, Units, read_probe, read_recording, resting_input, write_recording
 from ._task import Circle, Origin, Pulse, Task
 
 __all__ = [
@@ -47,6 +47,7 @@ __all__ = [
     "measure_limits",
     "measured",
     "probe",
+    "read_probe",
     "read_recording",
     "recognise",
     "resting_input",

@@ -42,7 +42,7 @@ def check_recorded(
     give_up
         What the lower bound has to be above.
     """
-    _check_time(time, lines, episode.sample_time)
+    check_time(time, lines, episode.sample_time)
     samples, recorded = study.task.samples(episode.sample_time), len(episode.tension)
     whole, missing = samples * episode.sample_time, samples - recorded
     if missing < 0:
@@ -64,7 +64,8 @@ def check_recorded(
     )
 
 
-def _check_time(time: np.ndarray, lines: list[int], sample_time: float) -> None:
+def check_time(time: np.ndarray, lines: list[int], sample_time: float) -> None:
+    """ValueError unless rows (k,) s on those lines of a file are one sample apart, from 0 on."""
     steps, apart = np.diff(time), float(np.median(np.diff(time)))
     if not abs(apart / sample_time - 1) < _JITTER:
         unit = "; is t in ms?" if abs(apart / (1e3 * sample_time) - 1) < _JITTER else ""

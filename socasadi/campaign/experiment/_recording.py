@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...model import Record
 from ...mpc import LinearMPC
 from ._episode import Episode
-from ._recorded import check_recorded
+from ._recorded import check_recorded, check_time
 
 if TYPE_CHECKING:
     from .._study import Study
@@ -32,6 +33,11 @@ class Units:
     def of(cls, plant: object) -> "Units":
         """Those of a plant: what it says, or metres and newtons."""
         return cls(getattr(plant, "output_unit", "m"), getattr(plant, "input_unit", "N"))
+
+    @property
+    def shown(self) -> tuple[float, str]:
+        """How many of the unit in which outputs are told to people are in one of theirs, and that unit: mm for m."""
+        return (1e3, "mm") if self.output == "m" else (1.0, self.output)
 
     def columns(self, mpc: LinearMPC, *, reference: bool = True) -> dict[str, str]:
         """Names of the columns and their units, in the order in which they are written."""
@@ -67,39 +73,41 @@ def read_recording(path: str | Path, study: "Study", *, give_up: float | None = 
     RecordingError
         Anything is missing, too much or implausible; the line, the column and the value are named.
     """
-    path, mpc = Path(path), study.mpc
-    units = Units.of(study.plant)
-    columns, rows = _table(path)
-    found = _placed(path, columns, units.columns(mpc), optional={f"r{i}" for i in range(1, mpc.outputs + 1)})
-    held, first = resting_input(mpc), rows[0] if rows else None
-    if first is not None and _number(path, first, found, "t") < -mpc.sample_time / 2:
-        held = np.array([_number(path, first, found, f"u{j}") for j in range(1, mpc.inputs + 1)])
-        rows = rows[1:]
-    if len(rows) < 2:
-        raise RecordingError(f"{path} holds {len(rows)} rows of samples; at least two are needed")
-    lines = [line for line, _ in rows]
-
-    def columns_of(kind: str, size: int, rows: list[_Row]) -> np.ndarray:
-        names = [f"{kind}{i}" for i in range(1, size + 1)] if size else []
-        return np.array([[_number(path, row, found, name) for name in names] for row in rows]).reshape(len(rows), size)
-
-    time = np.array([_number(path, row, found, "t") for row in rows])
+    sheet, mpc = _Sheet.read(Path(path), study), study.mpc
     episode = Episode(
         sample_time=mpc.sample_time,
-        output=(output := columns_of("y", mpc.outputs, rows)),
-        reference=study.task.reference(mpc.sample_time * np.arange(len(rows))),
+        output=(output := sheet.columns("y", mpc.outputs)),
+        reference=study.task.reference(mpc.sample_time * np.arange(len(sheet.rows))),
         truth=output,
-        tension=columns_of("u", mpc.inputs, rows[:-1]),
-        held=held,
+        tension=sheet.columns("u", mpc.inputs, last=False),
+        held=sheet.held,
         shapes=np.zeros((0, 0, 3)),
-        disturbance=columns_of("w", mpc.measured_disturbances, rows[:-1]),
+        disturbance=sheet.columns("w", mpc.measured_disturbances, last=False),
     )
-    wanted = columns_of("r", mpc.outputs, rows) if "r1" in found else None
+    wanted = sheet.columns("r", mpc.outputs) if "r1" in sheet.found else None
     try:
-        bound = check_recorded(episode, study, time, lines, wanted, units, give_up)
+        bound = check_recorded(episode, study, sheet.time, sheet.lines, wanted, Units.of(study.plant), give_up)
     except ValueError as error:
         raise RecordingError(f"{path}{error}") from None
     return episode if bound is None else Episode(**{**vars(episode), "cut": bound})
+
+
+def read_probe(path: str | Path, study: "Study") -> Record:
+    """The probing record in a CSV file: a short open-loop experiment in which all inputs were moved on their own.
+
+    Columns as in :func:`read_recording`, of any number of samples; a reference is ignored.
+
+    Raises
+    ------
+    RecordingError
+        Anything is missing, too much or implausible; the line, the column and the value are named.
+    """
+    sheet, mpc = _Sheet.read(Path(path), study), study.mpc
+    try:
+        check_time(sheet.time, sheet.lines, mpc.sample_time)
+    except ValueError as error:
+        raise RecordingError(f"{path}{error}") from None
+    return Record(mpc.sample_time, sheet.columns("u", mpc.inputs, last=False), sheet.columns("y", mpc.outputs))
 
 
 def write_recording(episode: Episode, path: str | Path, *, output_unit: str = "m", input_unit: str = "N") -> None:
@@ -118,12 +126,54 @@ def write_recording(episode: Episode, path: str | Path, *, output_unit: str = "m
         for t, y in enumerate(episode.output):
             last = t == len(episode.tension)
             u = nothing["u"] if last else episode.tension[t].tolist()
-            w = [""] * k if last else episode.disturbance[t].tolist()[:k]
+            w = [""] * k if last or not k else episode.disturbance[t].tolist()
             write([repr(float(episode.time[t])), *y.tolist(), *u, *episode.reference[t].tolist(), *w])
 
 
 _Row = tuple[int, list[str]]
 """A line's number and its cells."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Sheet:
+    """The rows of samples in a file, where each column stands in them, and what was held before them."""
+
+    path: Path
+    rows: list[_Row]
+    found: dict[str, int]
+    held: np.ndarray
+
+    @classmethod
+    def read(cls, path: Path, study: "Study") -> "_Sheet":
+        mpc = study.mpc
+        headings, rows = _table(path)
+        columns = Units.of(study.plant).columns(mpc)
+        found = _placed(path, headings, columns, optional={f"r{i}" for i in range(1, mpc.outputs + 1)})
+        held, first = resting_input(mpc), rows[0] if rows else None
+        if first is not None and _number(path, first, found, "t") < -mpc.sample_time / 2:
+            held = np.array([_number(path, first, found, f"u{j}") for j in range(1, mpc.inputs + 1)])
+            rows = rows[1:]
+        if len(rows) < 2:
+            raise RecordingError(f"{path} holds {len(rows)} rows of samples; at least two are needed")
+        return cls(path, rows, found, held)
+
+    def columns(self, kind: str, size: int, last: bool = True) -> np.ndarray:
+        """Those of one kind (rows, size), with or without the last row."""
+        rows = self.rows if last else self.rows[:-1]
+        names = [f"{kind}{i}" for i in range(1, size + 1)]
+        return np.array([[self._number(row, name) for name in names] for row in rows]).reshape(len(rows), size)
+
+    @property
+    def time(self) -> np.ndarray:
+        return np.array([self._number(row, "t") for row in self.rows])
+
+    @property
+    def lines(self) -> list[int]:
+        return [line for line, _ in self.rows]
+
+    def _number(self, row: _Row, name: str) -> float:
+        return _number(self.path, row, self.found, name)
+
 
 _HEADING = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*(?:[\[(]\s*(?P<unit>[^\])]*?)\s*[\])])?\s*")
 

@@ -1,0 +1,128 @@
+"""Can a controller of this make do it: what the cost asks for, how fast, how often, and through how much noise."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..campaign import Cost
+from ..mpc import weight_matrix
+from ._case import Case, percent
+from ._finding import Finding
+
+_FOLLOWED, _TRAPPED = 0.95, 0.8
+"""Shares of the way that the cost's own optimum goes: ``ok`` from the first, ``infeasible`` below the second."""
+_EXACT = 0.995
+_HOPELESS = 1.5
+"""Share of the input bound from which on a reference is too fast."""
+_SAMPLES_A_PERIOD = (4.0, 10.0)
+_LOUD = (0.2, 0.5)
+"""Noise (standard deviation of a distance) as a share of what is asked for: doubtful, and infeasible, from there."""
+
+
+def following(case: Case) -> list[Finding]:
+    """What share of the input bound does it take to follow the reference as fast as it moves, and who would pay it?"""
+    if not case.asked:
+        return []
+    findings = _speed(case) if case.holds else []
+    if any(finding.verdict == "infeasible" for finding in findings):
+        return findings
+    mpc, cost = case.study.mpc, case.study.cost
+    findings.append(_weighed(case, cost, "cost weights"))
+    own = Cost(Q=mpc.Q, R=mpc.R, input_term=mpc.input_term)
+    return findings if own == cost else [*findings, _weighed(case, own, "MPC weights")]
+
+
+def timing(case: Case) -> list[Finding]:
+    """Do sample time and horizon fit the first mode?"""
+    mpc = case.study.mpc
+    frequency, ratio = case.robot.slowest(case.rest)
+    if not frequency:
+        return []  # not stable at rest, which is said elsewhere
+    period = 1 / frequency
+    samples, seen = period / mpc.sample_time, mpc.horizon * mpc.sample_time / period
+    mode = f"the first mode has {frequency:.3g} Hz and a damping ratio of {ratio:.2g}"
+    says = f"{mode}: {samples:.3g} samples a period"
+    few, enough = _SAMPLES_A_PERIOD
+    if samples >= enough or ratio >= 1:
+        findings = [Finding("sample time", "ok", says)]
+    else:
+        advice = f"a sample time of {period / enough:.2g} s or less"
+        findings = [Finding("sample time", "doubtful" if samples >= few else "infeasible", says, advice)]
+    says = f"{mpc.horizon} samples are {seen:.2g} of its period"
+    if mpc.terminal is not None:
+        findings.append(Finding("horizon", "ok", f"{says}; what comes after is in the terminal cost"))
+    elif seen >= 0.5 or ratio >= 1:
+        findings.append(Finding("horizon", "ok", says))
+    else:
+        advice = f"terminal='riccati', or a horizon of {round(0.5 * samples)} samples"
+        findings.append(Finding("horizon", "doubtful", f"{says}, and no terminal cost stands for the rest", advice))
+    return findings
+
+
+def noise(case: Case) -> list[Finding]:
+    """What does the sensor's noise leave to be seen, and what floor does it put under J?"""
+    if case.noise is None:
+        return [Finding("noise", "unknown", "nothing is known of the sensor's noise", "bring a probing record")]
+    mpc, cost = case.study.mpc, case.study.cost
+    Q, samples = weight_matrix(cost.Q, mpc.outputs, "Q of the cost"), len(case.reference) - 1
+    floor = samples * float(np.trace(Q)) * case.noise**2
+    best = case.best_flight(cost).J
+    distance = case.noise * np.sqrt(mpc.outputs)
+    reached = float(np.linalg.norm(case.far.output - case.rest.output))
+    told = case.length(case.noise)
+    says = f"{told} of it puts a floor of {floor:.3g} under J, beside {best:.3g} that the best flight costs"
+    asked = min(case.asked, reached) if reached else case.asked
+    share = distance / asked if asked else 0.0
+    if share > _LOUD[0]:
+        than = "more than" if case.noise > reached else f"{percent(case.noise / reached)} of"
+        says += f"; that is {than} the {case.length(reached)} that the robot can move towards the reference"
+        return [Finding("noise", "infeasible" if share > _LOUD[1] else "doubtful", says, "a better sensor")]
+    if floor > best > 0:
+        says += ": most of J will be noise, and trials differ little in the rest"
+        return [Finding("noise", "doubtful", says, "a better sensor, or a longer or larger task")]
+    return [Finding("noise", "ok", says)]
+
+
+def _speed(case: Case) -> list[Finding]:
+    flight = case.best_flight(_lighter(case, case.study.cost, _EXACT)[1])
+    share = float(np.abs(flight.input[case.settled] / case.study.mpc.input_scale).max())
+    says = f"following the reference as fast as it moves takes {percent(share)} of the input bound"
+    if share <= 1:
+        return [Finding("speed", "ok", says)]
+    verdict = "infeasible" if share > _HOPELESS else "doubtful"
+    return [Finding("speed", verdict, says, "a slower reference, or larger input_bounds")]
+
+
+def _weighed(case: Case, cost: Cost, name: str) -> Finding:
+    share = case.followed(case.best_flight(cost))
+    says = f"the flight of least cost goes {percent(share)} of the way that the task asks for"
+    if share >= _FOLLOWED:
+        return Finding(name, "ok", says)
+    factor, _ = _lighter(case, cost, _FOLLOWED)
+    advice = f"R {_times(1 / factor)} times smaller"
+    if cost.input_term != "rate":
+        what = "in newtons" if cost.input_term == "literal" else "in shares of its bound"
+        says += f": R weighs the input {what}, and not to move is cheap"
+        advice = f"input_term='rate', or {advice}"
+    return Finding(name, "infeasible" if share < _TRAPPED else "doubtful", says, advice)
+
+
+def _lighter(case: Case, cost: Cost, share: float) -> tuple[float, Cost]:
+    """The cost with just so small an R that its optimum goes that share of the way, and the factor on R."""
+    R = np.asarray(cost.R, dtype=float)
+
+    def scaled(exponent: float) -> Cost:
+        return replace(cost, R=10.0**exponent * R)
+
+    if case.followed(case.best_flight(cost)) >= share:
+        return 1.0, cost
+    low, high = -8.0, 0.0
+    while high - low > 0.05:
+        middle = (low + high) / 2
+        low, high = (middle, high) if case.followed(case.best_flight(scaled(middle))) >= share else (low, middle)
+    return 10.0**low, scaled(low)
+
+
+def _times(factor: float) -> str:
+    """A factor as it is told: two digits."""
+    return f"{float(f'{factor:.2g}'):,.0f}" if 10 <= factor < 1e5 else f"{factor:.2g}"

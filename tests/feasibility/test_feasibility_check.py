@@ -1,0 +1,122 @@
+"""Every fault that a study can have is named, and a sound study has none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from feasibility_support import MODEL, study, verdicts
+
+from socasadi import Circle, Cost, LaserSpot, Modal, Origin, Rod, SimulatedPlant
+from socasadi.codegen import c_compiler
+from socasadi.feasibility import check
+from socasadi.rod import Material, Section, Strain, cables_around
+
+PAPER = Rod.preset("paper")
+WAND = Rod(
+    0.6,
+    Section.circle(0.012),
+    Material(1e6, 0.5, 1000.0, 1.1e4),
+    Strain(bending_y=2, bending_z=2, stretch=0),
+    cables_around(3, 0.01),
+    gravity=(-9.81, 0.0, 0.0),
+)
+"""Stands upright, and is too slender to."""
+STIFF_MODEL = MODEL.with_bounds(
+    [(20.0, 40.0) if entry.unit == "rad/s" else (entry.lower, entry.upper) for entry in MODEL.entries]
+)
+TURNED = Modal.from_spec(
+    length=0.6, bending_stiffness=0.64, mass_per_length=2.8, cable_offset=0.02, cable_angles=(180.0, 300.0, 60.0)
+)
+
+BROKEN = {
+    "a circle beyond reach": (
+        lambda: study(task=Circle(radius=0.12), output_bounds=None),
+        "reach",
+        "infeasible",
+        "96.9",
+    ),
+    "millimetres for metres": (lambda: study(task=Circle(radius=50.0), output_bounds=None), "reach", "infeasible", ""),
+    "cables that only pull": (lambda: study(input_bounds=(0, 8)), "reach", "infeasible", ""),
+    "bounds within the circle": (lambda: study(output_bounds=(-0.04, 0.04)), "output bounds", "infeasible", "10 mm"),
+    "R on newtons": (lambda: study(cost=Cost(input_term="literal")), "cost weights", "infeasible", "newtons"),
+    "R on newtons in the MPC": (lambda: study(input_term="literal"), "MPC weights", "infeasible", "newtons"),
+    "two samples a period": (lambda: study(sample_time=0.5), "sample time", "infeasible", "0.736 Hz"),
+    "a short horizon alone": (lambda: study(terminal=None), "horizon", "doubtful", "0.37"),
+    "a noisy sensor": (lambda: study(noise=0.03, output_bounds=None), "noise", "infeasible", "30 mm"),
+    "an arm that buckles": (lambda: study(rod=WAND, task=Circle(radius=0.01)), "gravity", "infeasible", "0.13"),
+    "a model too stiff": (lambda: study(model=STIFF_MODEL), "model", "infeasible", "outside"),
+    "cables on the other side": (lambda: study(model=TURNED), "model", "infeasible", "outside"),
+    "two turns a second": (lambda: study(task=Circle(period=0.5)), "speed", "infeasible", ""),
+    "a start out of reach": (lambda: study(task=Origin(tip=(0.3, 0.0))), "start", "infeasible", "188 mm"),
+}
+if c_compiler():
+    BROKEN["weights too far apart"] = (lambda: study(slack_weight=1e9), "single precision", "doubtful", "1e+09")
+
+
+@pytest.mark.parametrize("fault", BROKEN)
+def test_a_study_broken_in_one_way_is_told_that_way(fault):
+    made, name, verdict, number = BROKEN[fault]
+    found = check(made())
+    first = found.objections[0]
+    assert (first.name, first.verdict) == (name, verdict)
+    assert number in first.says
+    assert first.advice
+    assert [finding.name for finding in found.objections if finding.verdict == "infeasible"] in ([name], [])
+
+
+@pytest.mark.parametrize(
+    "sound",
+    [
+        lambda: study(),
+        lambda: study(task=Origin()),
+        lambda: study(rod=Rod.preset("hanging"), task=Circle(radius=0.03)),
+        lambda: study(model=Modal()),
+        lambda: study(plant=SimulatedPlant(PAPER, output=LaserSpot(1.0))),
+    ],
+)
+def test_a_sound_study_has_nothing_against_it(sound):
+    found = check(sound())
+    assert found.objections == ()
+    assert found.verdict == "ok"
+
+
+def test_the_papers_table_taken_literally_is_infeasible_for_three_reasons():
+    literal = study(rod=Rod.preset("paper_literal"), noise=0.01, cost=Cost(input_term="literal"), input_term="literal")
+    found = {finding.name: finding for finding in check(literal, quick=True).findings}
+    # Three cables move the tip by 4.6 mm, one by 2.3: not by 50.
+    assert found["reach"].verdict == "infeasible"
+    assert "4.59 mm" in found["reach"].says
+    assert "2.29 mm" in found["pulling"].says
+    # The cost's own optimum is not to move.
+    assert found["cost weights"].verdict == "infeasible"
+    assert "not to move is cheap" in found["cost weights"].says
+    # The noise is more than the reach.
+    assert found["noise"].verdict == "infeasible"
+    assert "more than the 4.59 mm" in found["noise"].says
+
+
+def test_an_arm_that_hangs_sideways_is_told_where_it_rests():
+    found = verdicts(check(study(rod=replace(PAPER, gravity=(0.0, 0.0, -9.81))), quick=True))
+    assert found["reach"] == "infeasible"
+    assert found["output bounds"] == "doubtful"
+
+
+def test_gravity_that_helps_and_gravity_that_hurts():
+    """The paper's arm upright: w L^3 / (E I) = 9.4, and a cantilever buckles at 7.8373 (Greenhill 1881)."""
+    upright = replace(PAPER, gravity=(-9.81, 0.0, 0.0))
+    load = 1000.0 * np.pi * 0.03**2 * 9.81 * 0.6**3 / (1e6 * np.pi * 0.03**4 / 4)
+    (finding,) = [f for f in check(study(rod=upright), quick=True).findings if f.name == "gravity"]
+    assert finding.verdict == "infeasible"
+    times = float(finding.says.split("up to ")[1].split(" times")[0])
+    assert times == pytest.approx(7.8373 / load, rel=0.02)
+    assert verdicts(check(study(rod=Rod.preset("hanging")), quick=True))["gravity"] == "ok"
+
+
+def test_the_advice_on_R_is_enough():
+    trapped = study(cost=Cost(input_term="literal"))
+    (finding,) = check(trapped, quick=True).objections
+    times = float(finding.advice.split("R ")[-1].split(" times")[0].replace(",", ""))
+    mended = study(cost=Cost(R=1 / (1.02 * times), input_term="literal"))
+    assert verdicts(check(mended, quick=True))["cost weights"] == "ok"
+    barely = study(cost=Cost(R=2 / times, input_term="literal"))
+    assert verdicts(check(barely, quick=True))["cost weights"] == "doubtful"
