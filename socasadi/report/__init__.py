@@ -1,5 +1,6 @@
-"""Figures of a run; it only draws."""
+"""Figures and animations of a run; it only draws."""
 
+from ._animation import animate
 from ._figures import figures, save_figures
 
-__all__ = ["figures", "save_figures"]
+__all__ = ["animate", "figures", "save_figures"]
