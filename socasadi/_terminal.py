@@ -2,7 +2,8 @@
 
 import sys
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -10,10 +11,11 @@ from typing import Annotated
 import numpy as np
 import typer
 from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
 from .campaign import Asked, Result, RunError, Study, Trial, Units, Verdict, clock, load_study
-from .campaign.store import compare_settings, read_settings
+from .campaign.store import compare_settings, journal_path, read_settings
 from .export import NotBuiltError, build_and_replay
 from .feasibility import Finding
 
@@ -161,3 +163,29 @@ def replay(folder: Path) -> str:
         return build_and_replay(folder)
     except NotBuiltError as error:
         return str(error)
+
+
+@contextmanager
+def counting(what: str) -> Iterator[Callable[[int, int], None]]:
+    """What takes how much is done, and of how much: a bar on a terminal, nothing elsewhere."""
+    if not out.is_terminal:
+        yield lambda done, total: None
+        return
+    with Progress(BarColumn(12), MofNCompleteColumn(), TextColumn("{task.description}"), console=out) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def print_contents(folder: Path) -> None:
+    """What a run folder holds, each with its path."""
+    figures = sorted({file.stem for file in (folder / "figures").glob("*")})
+    held = {
+        "journal": (journal_path(folder), ""),
+        "figures": (folder / "figures", f": {', '.join(figures)}"),
+        "controller": (folder / "controller", ", in C"),
+        "Sobol points": (folder / "sobol", ", the baseline: a run of its own"),
+        "report": (folder / "report.html", ""),
+    }
+    for name, (path, note) in held.items():
+        if path.exists():
+            out.print(f"  {name:12}  {path}{note}")

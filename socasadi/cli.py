@@ -2,6 +2,7 @@
 
 import sys
 import warnings
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated
 
@@ -11,16 +12,19 @@ from rich.table import Table
 from ._bench_commands import ask, init, tell
 from ._check_command import check_
 from ._run_command import run
+from ._sparkline import sparkline
 from ._terminal import (
     RunFolder,
     StudyScript,
     best_of,
+    counting,
     distance,
     estimated,
     opened,
     out,
     outcome,
     print_chosen,
+    print_contents,
     print_verdicts,
     replay,
     spared,
@@ -39,7 +43,7 @@ from .campaign import (
 from .codegen import CompilationError
 from .export import ExportError
 from .plant import ExternalPlantError
-from .report import figures, save_figures
+from .report import animate, figures, save_figures
 
 app = typer.Typer(
     help="Tune a soft robot's model predictive controller in closed loop, and get it as C.",
@@ -90,6 +94,8 @@ def show(
         out.print(f"limits: {most}; ! is above its limit")
     for trial in result.taken_back:
         out.print(f"taken back: trial {trial.number}, told as {outcome(trial)}")
+    if lines := sparkline(result.trials, result.kept, out.width, out.encoding):
+        out.print("", *lines, sep="\n")
     if told := estimated(result):
         out.print(told)
     if verdicts := assessed(result):
@@ -98,16 +104,26 @@ def show(
         print_chosen(result)
     state = "complete" if result.complete else f"{len(result.trials)} of {study.trials} trials so far"
     out.print(f"\n{run_folder}: {state}{spared(result)}")
+    print_contents(run_folder)
 
 
 @app.command()
 def plot(
     run_folder: RunFolder,
     trial: Annotated[int | None, typer.Option(help="Trial whose episode is drawn; the best by default.")] = None,
+    animation: Annotated[
+        Path | None,
+        typer.Option("--animate", metavar="FILE", help="Animate the episode instead, in FILE.mp4 or FILE.gif."),
+    ] = None,
     script: StudyScript = None,
 ) -> None:
-    """Draw the figures of a run again."""
+    """Draw the figures of a run again, or an animation of one episode."""
     result = opened(run_folder, script)
+    if animation is not None:
+        with counting(f"frames of {animation}") as progress:
+            animate(result, animation, trial, progress=progress)
+        out.print(f"{animation}: {animation.stat().st_size / 1e6:.2g} MB")
+        return
     beside = run_folder / "sobol"
     baseline = Result(result.study, beside).trials if beside.is_dir() else None
     for file in save_figures(figures(result, baseline, trial), run_folder / "figures"):
@@ -155,6 +171,8 @@ def emulate_(
 
 def main() -> None:
     """Entry point: errors that a user can mend are one sentence, without a traceback."""
+    if isinstance(sys.stdout, TextIOWrapper):  # as its stderr does, where a name holds what cannot be encoded
+        sys.stdout.reconfigure(errors="backslashreplace")
     warnings.showwarning = lambda message, *_, **__: print(f"socasadi: {message}", file=sys.stderr)
     try:
         app()

@@ -24,7 +24,13 @@ ROOMS = {
     "report": {"rod", "plant", "campaign", "baselines", "feasibility", "matplotlib"},
 }
 # What a room is made of beyond its table: libraries that serve one purpose in one room.
-LIBRARIES = {"campaign": {"distributed"}, "codegen": {"platformdirs"}, "export": {"jinja2"}, "tune": {"threadpoolctl"}}
+LIBRARIES = {
+    "campaign": {"distributed"},
+    "codegen": {"platformdirs"},
+    "export": {"jinja2"},
+    "report": {"PIL", "imageio_ffmpeg"},
+    "tune": {"threadpoolctl"},
+}
 # casadi is the language of everything symbolic, and a model's matrices are part of what is exported. Whether single
 # precision does is tried by the very test of the export.
 GRANTED = {"plant": {"casadi"}, "export": {"model"}, "feasibility": {"casadi", "codegen", "export"}}

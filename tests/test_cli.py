@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from socasadi.campaign import Journal, Result
 from socasadi.codegen import c_compiler
@@ -68,6 +69,47 @@ def test_show_plot_and_export_need_the_run_folder_alone(finished, tmp_path):
     exported = socasadi("export", run, "--out", "c", cwd=tmp_path)
     assert exported.returncode == 0, exported.stderr
     assert (tmp_path / "c" / "controller.h").exists()
+
+
+def test_show_draws_the_costs_and_says_where_things_lie(finished):
+    folder, _ = finished
+    run = Path("runs") / "study"
+    best = Result.open(folder / run).best.number
+    shown = socasadi("show", run, cwd=folder, PYTHONIOENCODING="utf-8")
+    legend, line, pointer = re.search(r"\n(J over the trials: .*)\n(.*)\n(.*)\n", shown.stdout).groups()
+    assert "▁" in legend
+    assert len(line) == 6
+    assert line[best - 1] == "▁"
+    assert pointer.index("^") == best - 1
+    places = dict(re.findall(r"^  (\w+(?: \w+)?) +(runs/study/[\w.]+)", shown.stdout, re.M))
+    assert places == {
+        "journal": "runs/study/journal.sqlite",
+        "figures": "runs/study/figures",
+        "controller": "runs/study/controller",
+        "Sobol points": "runs/study/sobol",
+    }
+    assert "figures: convergence, inputs, path, responses, shapes" in shown.stdout
+
+
+def test_show_reads_where_only_ascii_can_be_printed(finished, tmp_path):
+    folder, _ = finished
+    shutil.copytree(folder / "runs" / "study", tmp_path / "für")
+    shown = socasadi("show", "für", cwd=tmp_path, PYTHONIOENCODING="ascii", PYTHONUTF8="1")
+    assert shown.returncode == 0, shown.stderr
+    assert "f\\xfcr: complete" in shown.stdout
+    assert re.search(r"\nJ over the trials: \. .*\n[.:=+*#>x-]{6}\n", shown.stdout)
+
+
+def test_plot_animates_one_episode_and_only_with_a_suffix_that_it_knows(finished, tmp_path):
+    folder, _ = finished
+    animated = socasadi("plot", "runs/study", "--animate", tmp_path / "talk" / "one.gif", "--trial", 2, cwd=folder)
+    assert animated.returncode == 0, animated.stderr
+    assert re.fullmatch(r".*one\.gif: [\d.]+ MB\n", animated.stdout)
+    with Image.open(tmp_path / "talk" / "one.gif") as image:
+        assert (image.n_frames, image.size) == (11, (1280, 720))
+    refused = socasadi("plot", "runs/study", "--animate", tmp_path / "one.webm", cwd=folder)
+    assert refused.returncode == 1
+    assert re.fullmatch(r"socasadi: the animation .*one\.webm ends in '\.webm'; take \.gif or \.mp4\n", refused.stderr)
 
 
 def test_a_robot_that_only_pulls_and_one_that_hangs_work_through_the_whole_line(tmp_path):

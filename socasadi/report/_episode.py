@@ -87,13 +87,11 @@ def shapes(episode: Episode, instants: int = 6) -> Figure | None:
     figure = Figure(figsize=(COLUMN, 92 * MM), layout="none")  # pyright: ignore[reportArgumentType]
     axes = figure.add_subplot(projection="3d")
     chosen = _far_apart(episode.shapes[:, -1], instants)
-    every = (len(episode.output) - 1) / max(len(episode.shapes) - 1, 1)
     for k, index in enumerate(chosen):
         x, y, z = 1e3 * episode.shapes[index].T
         shade = 0.75 * (1 - k / max(len(chosen) - 1, 1))
         colour = (shade, 0.447 * (1 - shade) + shade * 0.85, 0.698 * (1 - shade) + shade * 0.95)
-        time = index * round(every) * episode.sample_time
-        axes.plot(y, z, x, color=colour, lw=1.6, label=f"{time:.4g} s")
+        axes.plot(y, z, x, color=colour, lw=1.6, label=f"{episode.shape_time[index]:.4g} s")
         axes.plot(y[-1:], z[-1:], x[-1:], "o", color=colour, ms=3)
     length = 1e3 * np.abs(episode.shapes).max()
     if episode.reference.shape[1] == 2 and np.ptp(episode.reference, axis=0).max() > 0:

@@ -82,6 +82,11 @@ class Episode:
         return self.sample_time * np.arange(len(self.output))
 
     @property
+    def shape_time(self) -> np.ndarray:
+        """Instants of the shapes (k,), s."""
+        return self.sample_time * _SHAPE_EVERY * np.arange(len(self.shapes))
+
+    @property
     def record(self) -> Record:
         """Tensions and measured outputs, for identification."""
         return Record(self.sample_time, self.tension, self.output)
