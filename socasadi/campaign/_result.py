@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..export import ControllerRecord, export
-from ..tune import Estimate
+from ..tune import Estimate, Optimizer, Sensitivity
 from ._provenance import provenance
 from .execution import best_trial, flown_cost, keeps_limits, replayed
 from .experiment import Episode
@@ -84,6 +84,18 @@ class Result:
         Its ``index`` is a place in :attr:`trials`.
         """
         return replayed(self.study.optimizer(), self.trials).best_estimated
+
+    @functools.cached_property
+    def sensitivity(self) -> Sensitivity | None:
+        """How J depends on each entry of theta about the :attr:`chosen` one, as far as the search knows.
+
+        None when the search has no model of J, as that of Sobol points.
+        """
+        search = self.study.optimizer()
+        if not isinstance(search, Optimizer):
+            return None
+        replayed(search, self.trials)
+        return search.sensitivity(self.chosen.theta)
 
     @property
     def chosen(self) -> Trial:

@@ -15,6 +15,7 @@ Knows nothing of robots. GPy gives the marginal likelihood; prediction and acqui
 
 from ._optimizer import Optimizer
 from ._search import Estimate, Search, Timings, Trial
+from ._sensitivity import Sensitivity
 from ._sobol import SobolSearch
 from ._space import Parameter, ParameterLike, Space
 
@@ -24,6 +25,7 @@ __all__ = [
     "Parameter",
     "ParameterLike",
     "Search",
+    "Sensitivity",
     "SobolSearch",
     "Space",
     "Timings",

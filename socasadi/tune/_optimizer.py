@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 from ._belief import Belief, Believer, Start, last_full_fit
 from ._choice import Chooser
 from ._search import Estimate, History, Timings, Trial, check_seed
+from ._sensitivity import Sensitivity, sensitivity
 from ._sobol import SobolPoints
 from ._space import Space
 from .acquisition import acquisition_named
@@ -284,11 +285,25 @@ class Optimizer:
         ValueError
             While no told trial has a cost.
         """
-        if not any(trial.cost is not None for trial in self.trials):
-            raise ValueError("nothing can be predicted: tell a trial with a cost first")
-        belief = self._believe()
+        belief = self._told()
         mean, std = belief.cost.predict(self.space.to_unit(theta)[None, :])
         return belief.data.location + belief.data.scale * float(mean[0, 0]), belief.data.scale * float(std[0])
+
+    def sensitivity(self, theta: ArrayLike) -> Sensitivity:
+        """Return how the cost depends on each entry about `theta` (d,), and where the best of each may lie.
+
+        Raises
+        ------
+        ValueError
+            While no told trial has a cost.
+        """
+        return sensitivity(self._told(), self.space, self.space.check(theta), self._seed)
+
+    def _told(self) -> Belief:
+        """What is believed; ValueError while no told trial has a cost."""
+        if not any(trial.cost is not None for trial in self.trials):
+            raise ValueError("nothing can be predicted: tell a trial with a cost first")
+        return self._believe()
 
     def _next(self, waiting: NDArray) -> NDArray:
         told = len(self.trials)
