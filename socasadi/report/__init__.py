@@ -1,5 +1,21 @@
-"""Figures of a run; it only draws."""
+"""Figures of a run, and the look that they share, for figures of one's own; it only draws."""
 
+from ._convergence import best_so_far, cost_axis
 from ._figures import figures, save_figures
+from ._style import BLACK, BLUE, COLUMN, GREY, MM, ORANGE, SETTINGS, legend_above, page
 
-__all__ = ["figures", "save_figures"]
+__all__ = [
+    "BLACK",
+    "BLUE",
+    "COLUMN",
+    "GREY",
+    "MM",
+    "ORANGE",
+    "SETTINGS",
+    "best_so_far",
+    "cost_axis",
+    "figures",
+    "legend_above",
+    "page",
+    "save_figures",
+]
