@@ -1,7 +1,25 @@
-"""Figures and animations of a run; it only draws."""
+"""Figures, animations and the page of a run, and the look that they share, for figures of one's own; it only draws."""
 
 from ._animation import animate
+from ._convergence import best_so_far, cost_axis
 from ._figures import figures, save_figures
 from ._reach import reach_figure
+from ._style import BLACK, BLUE, COLUMN, GREY, MM, ORANGE, SETTINGS, legend_above, page
 
-__all__ = ["animate", "figures", "reach_figure", "save_figures"]
+__all__ = [
+    "BLACK",
+    "BLUE",
+    "COLUMN",
+    "GREY",
+    "MM",
+    "ORANGE",
+    "SETTINGS",
+    "animate",
+    "best_so_far",
+    "cost_axis",
+    "figures",
+    "legend_above",
+    "page",
+    "reach_figure",
+    "save_figures",
+]

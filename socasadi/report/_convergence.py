@@ -1,6 +1,7 @@
 from collections.abc import Callable
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
@@ -17,7 +18,7 @@ def convergence(trials: list[Trial], kept: Callable[[Trial], bool], baseline: li
     Trials stand in the order in which they were told.
     """
     figure, (axes,) = page(COLUMN, 62 * MM)
-    axes.set_yscale("log")
+    cost_axis(axes)
     known = [trial.J for trial in trials if trial.J is not None]
     ceiling = _HIGHEST * min(known, default=1.0)
     told = [(place, trial, trial.at_least if trial.J is None else trial.J) for place, trial in enumerate(trials, 1)]
@@ -64,18 +65,23 @@ def convergence(trials: list[Trial], kept: Callable[[Trial], bool], baseline: li
             ha="right" if right else "left",
             color=ORANGE,
         )
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda J, _: f"{J:g}"))
-    axes.yaxis.set_minor_locator(NullLocator())
     if known:
         highest = max(J for _, _, J in told if J is not None and ceiling >= J)
         axes.set_ylim(min(known) / 1.5, min(1.3 * highest, ceiling))
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     axes.set_xlim(0, max(len(trials), len(baseline or [])) + 2)
-    axes.set_xlabel("trial")
-    axes.set_ylabel("cost J")
     legend_above(axes, 3)
     return figure
+
+
+def cost_axis(axes: Axes) -> None:
+    """Costs of trials: J, which spans decades, on a logarithmic axis with numbers that can be read off."""
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda J, _: f"{J:g}"))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
+    axes.set_xlabel("trial")
+    axes.set_ylabel("cost J")
 
 
 def best_so_far(trials: list[Trial], kept: Callable[[Trial], bool]) -> np.ndarray:
