@@ -43,7 +43,7 @@ from .campaign import (
 from .codegen import CompilationError
 from .export import ExportError
 from .plant import ExternalPlantError
-from .report import animate, figures, save_figures
+from .report import animate, figures, html_report, save_figures
 
 app = typer.Typer(
     help="Tune a soft robot's model predictive controller in closed loop, and get it as C.",
@@ -128,6 +128,20 @@ def plot(
     baseline = Result(result.study, beside).trials if beside.is_dir() else None
     for file in save_figures(figures(result, baseline, trial), run_folder / "figures"):
         out.print(str(file))
+
+
+@app.command()
+def report(
+    run_folder: RunFolder,
+    file: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Where to write; report.html in RUN by default.")
+    ] = None,
+    script: StudyScript = None,
+) -> None:
+    """Write a run as one HTML file that opens from disk: all its figures, and the rod moving."""
+    with out.status("reporting"):
+        written = html_report(run_folder, file, None if script is None else opened(run_folder, script).study)
+    out.print(f"{written}: {written.stat().st_size / 1e6:.1f} MB, for any browser")
 
 
 @app.command()

@@ -28,12 +28,17 @@ LIBRARIES = {
     "campaign": {"distributed"},
     "codegen": {"platformdirs"},
     "export": {"jinja2"},
-    "report": {"PIL", "imageio_ffmpeg"},
+    "report": {"PIL", "imageio_ffmpeg", "jinja2", "plotly"},
     "tune": {"threadpoolctl"},
 }
 # casadi is the language of everything symbolic, and a model's matrices are part of what is exported. Whether single
 # precision does is tried by the very test of the export.
-GRANTED = {"plant": {"casadi"}, "export": {"model"}, "feasibility": {"casadi", "codegen", "export"}}
+GRANTED = {
+    "plant": {"casadi"},
+    "export": {"model"},
+    "feasibility": {"casadi", "codegen", "export"},
+    "report": {"casadi", "tune"},
+}
 
 
 def modules(file: Path) -> set[tuple[str, ...]]:

@@ -19,8 +19,8 @@ _PLACES = 24
 
 
 def percent(share: float) -> str:
-    """A share as it is told: two digits."""
-    return f"{float(f'{100 * share:.2g}'):g} %"
+    """A share as it is told: two digits, and no more than hundredths of a percent."""
+    return f"{round(float(f'{100 * share:.2g}'), 2) + 0.0:g} %"
 
 
 def _number(value: float) -> str:
@@ -168,9 +168,9 @@ class Case:
 
     @cached_property
     def settled(self) -> np.ndarray:
-        """Which samples come after 5 s, as in the RMSE; all of a task that is shorter."""
+        """Which samples come after 5 s, as in the RMSE; of a task shorter than 10 s the second half."""
         ends = self.study.mpc.sample_time * np.arange(1, len(self.reference))
-        return ends > 5.0 if ends[-1] > 5.0 else ends > 0
+        return ends > min(5.0, ends[-1] / 2 - 1e-9)
 
     @property
     def far(self) -> Pose:

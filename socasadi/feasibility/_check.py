@@ -62,7 +62,8 @@ def check(
             findings += question(case)
         # A robot that does not stand has no linear model worth fitting.
         stands = not any(finding.name == "gravity" and finding.verdict == "infeasible" for finding in findings)
-        if not quick and stands and not study.mpc.measured_disturbances:
+        guessed = plant is None and record is None
+        if not quick and stands and not guessed and not study.mpc.measured_disturbances:
             fits = _family.fits(case)
             findings += _family.family(case, fits)
             if all(finding.verdict != "infeasible" for finding in findings):

@@ -5,6 +5,7 @@ from ._convergence import best_so_far, cost_axis
 from ._figures import figures, save_figures
 from ._reach import reach_figure
 from ._style import BLACK, BLUE, COLUMN, GREY, MM, ORANGE, SETTINGS, legend_above, page
+from .html import html_report
 
 __all__ = [
     "BLACK",
@@ -18,6 +19,7 @@ __all__ = [
     "best_so_far",
     "cost_axis",
     "figures",
+    "html_report",
     "legend_above",
     "page",
     "reach_figure",
