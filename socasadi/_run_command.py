@@ -63,7 +63,9 @@ def run(
     study = replace(study, **{name: value for name, value in given.items() if value is not None})
     folder = folder or Path("runs") / script.stem
     out.print(f"{script}: {study.trials} trials of {study.task.duration:g} s, into {folder}")
-    print_check(check(study, quick=True).objections)
+    against = check(study, quick=True).objections
+    out.print("check: what stands against it" if against else "check: nothing stands against it")
+    print_check(against)
     began = time.monotonic()
     try:
         with interruptible(), ExitStack() as stack:
@@ -93,6 +95,7 @@ def _run(study: Study, folder: Path, resume: bool, flown: dict[str, Any]) -> Non
     _summary(result, baseline, assessment)
     out.print(f"\ncontroller  {folder / 'controller'}\n            {replayed}")
     out.print(f"figures     {folder / 'figures'}: {', '.join(sorted({file.stem for file in files}))}")
+    out.print(f"to look at  socasadi report {shlex.quote(str(folder))}")
 
 
 def _again(script: Path, options: list[tuple[str, Any]]) -> str:
