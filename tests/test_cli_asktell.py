@@ -183,9 +183,9 @@ def test_more_iterations_may_be_wanted_later(at_the_bench, socasadi):
     assert asked(socasadi)[0]["trial"] == 4
 
 
-def test_what_the_readme_shows_runs(at_the_bench, socasadi):
-    readme = (Path(__file__).parent.parent / "README.md").read_text()
-    section = readme.split("## With a robot of your own")[1].split("\n## ")[0]
+def test_what_the_guide_shows_runs(at_the_bench, socasadi):
+    guide = (Path(__file__).parent.parent / "studies" / "guide.md").read_text()
+    section = guide.split("## With a robot of your own")[1].split("\n## ")[0]
     (script,) = re.findall(r"```python\n(.*?)```", section, re.S)
     (commands,) = re.findall(r"```\n(socasadi.*?)```", section, re.S)
     Path("arm.py").write_text(script)
