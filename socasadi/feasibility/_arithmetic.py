@@ -1,4 +1,4 @@
-"""Is the loop stable with the model that fits best, and do solver and single precision do for the weights."""
+"""With the model that fits best: is the loop stable, what error is left, do solver and single precision do."""
 
 import numpy as np
 
@@ -8,6 +8,8 @@ from ..mpc import Controller, DesignError
 from ._case import Case
 from ._finding import Finding
 
+_LARGE = 0.2
+"""Settled error as a share of what the task asks for, from which on it is doubtful."""
 _SAMPLES, _FALLBACKS = 500, 0.02
 """Random samples that the solver is given, and the share of them that may fail its check."""
 
@@ -21,7 +23,9 @@ def arithmetic(case: Case, theta: np.ndarray) -> list[Finding]:
     except DesignError as error:
         says = f"the model that fits the robot best gives none: {error}"
         return [Finding("controller", "infeasible", says, "another family, or other weights")]
-    return [_loop(case, controller), *_precision(controller, record)]
+    loop = _loop(case, controller)
+    settled = [_settled(case, controller)] if loop.verdict == "ok" and case.noise is not None else []
+    return [loop, *settled, *_precision(controller, record)]
 
 
 def _loop(case: Case, controller: Controller) -> Finding:
@@ -30,6 +34,33 @@ def _loop(case: Case, controller: Controller) -> Finding:
     if not loop.stable:
         return Finding("loop", "infeasible", f"{says}: unstable", "a larger R, or terminal='riccati'")
     return Finding("loop", "ok", f"{says}; stable up to {loop.gain_margin[1]:.2g} times the robot's gain")
+
+
+def _settled(case: Case, controller: Controller) -> Finding:
+    noise = case.noise or 0.0
+    loud, quiet = (_settled_error(case, controller, level) for level in (noise, 0.0))
+    says = f"about {case.length(loud)} RMSE after the start, {case.length(quiet)} of it without noise"
+    if loud <= _LARGE * case.asked:
+        return Finding("settled error", "ok", says)
+    cause = "a better sensor, or a lower measurement_noise in the MPC" if quiet < loud / 2 else "other weights"
+    return Finding("settled error", "doubtful", f"{says}; the task asks for {case.length(case.asked)}", cause)
+
+
+def _settled_error(case: Case, controller: Controller, noise: float) -> float:
+    """Root mean square distance from the reference once settled, flown on the robot's linear model about rest."""
+    mpc, rest, random = case.study.mpc, case.rest, np.random.default_rng(0)
+    A, B, C, D = case.linear
+    u = case.begun.input - rest.input
+    x = np.linalg.lstsq(np.eye(len(A)) - A, B @ u, rcond=None)[0]
+    y, distances, ahead = case.begun.output, [], np.arange(1, mpc.reference_rows + 1)
+    controller.reset(case.begun.input)
+    for t, wanted in enumerate(case.reference[1:]):
+        measured = y + noise * random.standard_normal(len(y))
+        u = controller.step(measured, case.study.task.reference((t + ahead) * mpc.sample_time)) - rest.input
+        x = A @ x + B @ u
+        y = rest.output + C @ x + D @ u
+        distances.append(np.linalg.norm(y - wanted))
+    return float(np.sqrt(np.mean(np.square(distances)[case.settled])))
 
 
 def _precision(controller: Controller, record: ControllerRecord) -> list[Finding]:

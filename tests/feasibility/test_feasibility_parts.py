@@ -6,11 +6,11 @@ from feasibility_support import MODEL, study, verdicts
 from scipy.optimize import lsq_linear
 
 from socasadi import Circle, Cost, ExternalPlant, LinearMPC, Modal, Origin, Rod, SimulatedPlant, Study
-from socasadi.campaign import RecordingError, probe, read_probe
+from socasadi.campaign import RecordingError, fly, probe, read_probe
 from socasadi.feasibility import SpecSheetError, check, read_spec_sheet
 from socasadi.feasibility._optimum import optimum
 from socasadi.feasibility._reach import ray
-from socasadi.model import StateSpace
+from socasadi.model import StateSpace, identify
 
 SHEET = """
 length = 0.6
@@ -150,3 +150,14 @@ def test_the_start_is_judged_where_the_robot_is_known_from_a_model_alone():
     task = Origin(tip=(0.5, 0.0))
     plant = ExternalPlant(sample_time=0.05, inputs=3, outputs=2)
     assert verdicts(check(Study(plant=plant, mpc=LinearMPC(MODEL), task=task)))["start"] == "doubtful"
+
+
+@pytest.mark.parametrize("task", [Circle(), Origin()])
+def test_the_settled_error_is_what_the_identified_controller_flies_with(task):
+    """The check's linear flight against the rod itself, 20 s, to a quarter."""
+    asked = study(task=task)
+    says = next(finding.says for finding in check(asked).findings if finding.name == "settled error")
+    theta = identify(MODEL, probe(asked.plant, (-10, 10), seed=2))
+    episode = fly(asked.plant, asked.mpc.controller(theta), task, seed=0, time_limit=60)
+    flown = 1e3 * asked.cost.score(episode, asked.mpc.input_scale).rmse
+    assert float(says.removeprefix("about ").split(" mm")[0]) == pytest.approx(flown, rel=0.25)
