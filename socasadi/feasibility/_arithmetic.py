@@ -24,7 +24,9 @@ def arithmetic(case: Case, theta: np.ndarray) -> list[Finding]:
         says = f"the model that fits the robot best gives none: {error}"
         return [Finding("controller", "infeasible", says, "another family, or other weights")]
     loop = _loop(case, controller)
-    settled = [_settled(case, controller)] if loop.verdict == "ok" and case.noise is not None else []
+    if loop.verdict != "ok":
+        return [loop]
+    settled = [] if case.noise is None else [_settled(case, controller)]
     return [loop, *settled, *_precision(controller, record)]
 
 
@@ -32,7 +34,10 @@ def _loop(case: Case, controller: Controller) -> Finding:
     loop = controller.analysis(case.linear)
     says = f"with the model that fits best its spectral radius is {loop.spectral_radius:.3f}"
     if not loop.stable:
-        return Finding("loop", "infeasible", f"{says}: unstable", "a larger R, or terminal='riccati'")
+        advice = (
+            "a family that fits better, a larger R, terminal='riccati', or units in which the inputs are of like size"
+        )
+        return Finding("loop", "doubtful", f"{says}: unstable; the search has to find another", advice)
     return Finding("loop", "ok", f"{says}; stable up to {loop.gain_margin[1]:.2g} times the robot's gain")
 
 

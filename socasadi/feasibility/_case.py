@@ -51,8 +51,11 @@ class Case:
 
     @cached_property
     def pulling(self) -> Bounds | None:
-        """The inputs' bounds if they could only pull; None where they only pull as it is, or only push."""
+        """The bounds if the inputs could only pull; None where they are no tensions, or only pull or push as it is."""
         lower, upper = self.bounds
+        cables = self.of_a_rod.rod.cables if self.of_a_rod else ()
+        if self.units.input != "N" or any(getattr(cable, "drive", "") != "tension" for cable in cables):
+            return None
         return (np.maximum(lower, 0.0), upper) if (lower < 0).any() and (upper > 0).all() else None
 
     def corners(self, bounds: Bounds) -> np.ndarray:
@@ -84,6 +87,13 @@ class Case:
         """Outputs (p,) as they are told."""
         factor, unit = self.units.shown
         return f"({', '.join(_number(factor * value) for value in values)}) {unit}"
+
+    def share(self, given: np.ndarray) -> float:
+        """The largest share of the way from doing nothing to a bound that inputs (m,) go."""
+        nothing = np.clip(self.robot.neutral, *self.bounds)
+        way = np.where(given > nothing, self.bounds[1] - nothing, nothing - self.bounds[0])
+        gone = np.abs(given - nothing)
+        return float(np.max(np.divide(gone, way, out=np.zeros_like(gone), where=way > 0)))
 
     @cached_property
     def rest(self) -> Pose:
@@ -125,18 +135,42 @@ class Case:
         poses, pose = [], self.rest
         for wanted in self.places:
             pose = nearest(self.robot, wanted, self.bounds, pose)
+            if self._miss(pose, wanted) > CLOSE * self.asked:
+                # Winches may leave cables slack, which hides what they do; all of them tightened do not.
+                calm = (np.clip(self.robot.neutral, *self.bounds) + self.bounds[0]) / 2
+                tight = nearest(self.robot, wanted, self.bounds, self.robot.pose(calm), calm)
+                pose = min(pose, tight, key=lambda pose: self._miss(pose, wanted))
             poses.append(pose)
         return poses
+
+    @staticmethod
+    def _miss(pose: Pose, wanted: np.ndarray) -> float:
+        return float(np.linalg.norm(pose.output - wanted))
 
     @cached_property
     def misses(self) -> np.ndarray:
         """How far each of these is from what is wanted (k,)."""
-        return np.linalg.norm(np.array([pose.output for pose in self.held]) - self.places, axis=1)
+        return np.array([self._miss(pose, wanted) for pose, wanted in zip(self.held, self.places, strict=True)])
+
+    @cached_property
+    def effort(self) -> float:
+        """The largest share of the inputs' way to their bounds that holding the reference takes."""
+        return max(self.share(pose.input) for pose in self.held)
 
     @property
     def holds(self) -> bool:
         """Whether the reference can be held, or nearly so."""
-        return self.misses.max() <= FAR * self.asked
+        return bool(self.misses.max() <= FAR * self.size)
+
+    @property
+    def moved(self) -> float:
+        """How far the outputs can be moved from rest towards the reference."""
+        return float(np.linalg.norm(self.far.output - self.rest.output))
+
+    @property
+    def size(self) -> float:
+        """What misses are compared with: how far the outputs have to move, or can."""
+        return max(self.asked, self.moved)
 
     @cached_property
     def asked(self) -> float:

@@ -31,12 +31,13 @@ def known(study: Study, plant: SimulatedPlant | None, record: Record | None) -> 
             for entry in mpc.model.entries
         ]
     )
-    robot = LinearRobot(mpc.model, theta, mpc.sample_time, mpc.inputs, "the middle of theta's bounds")
-    rest = robot.pose(np.zeros(mpc.inputs))
-    widths = [entry.upper - entry.lower for entry in mpc.model.entries if entry.scale == "linear"]
-    if np.abs(rest.slope).max() < 0.05 * max(widths, default=0.0):
+    try:
+        robot = LinearRobot(mpc.model, theta, mpc.sample_time, mpc.inputs, "the middle of theta's bounds")
+    except np.linalg.LinAlgError:  # a model that does not come to rest
         return None, None
-    return robot, None
+    widths = [entry.upper - entry.lower for entry in mpc.model.entries if entry.scale == "linear"]
+    tells = np.abs(robot.pose(np.zeros(mpc.inputs)).slope).max() > 0.05 * max(widths, default=0.0)
+    return (robot if tells else None), None
 
 
 def _noise(record: Record, error: float) -> float:

@@ -16,11 +16,13 @@ _LEAST_NORM = 1e-4  # what a unit of input costs beside a miss as large as the r
 _CLIMBS = 4
 
 
-def nearest(robot: Robot, wanted: np.ndarray, bounds: Bounds, start: Pose) -> Pose:
-    """The pose within the bounds whose output is nearest to ``wanted`` (p,), of these the one of about least inputs.
+def nearest(robot: Robot, wanted: np.ndarray, bounds: Bounds, start: Pose, calm: np.ndarray | None = None) -> Pose:
+    """The pose within the bounds whose output is nearest to ``wanted`` (p,), and of these about nearest to ``calm``.
 
-    Gauss-Newton from ``start``: in each step a bounded least-squares problem on the linearised outputs.
+    Gauss-Newton from ``start``: in each step a bounded least-squares problem on the linearised outputs. ``calm`` (m,)
+    are inputs, those that do nothing by default.
     """
+    calm = robot.neutral if calm is None else calm
     pose, scale = start, np.maximum(*np.abs(bounds))
     scale = np.where(scale > 0, scale, 1.0)
     for _ in range(_STEPS):
@@ -31,7 +33,7 @@ def nearest(robot: Robot, wanted: np.ndarray, bounds: Bounds, start: Pose) -> Po
         lower, upper = (side / scale for side in bounds)
         free = lower < upper  # the solver wants its bounds apart
         answer = lower.copy()
-        rest = np.concatenate([goal, np.zeros(len(scale))]) - rows[:, ~free] @ lower[~free]
+        rest = np.concatenate([goal, _LEAST_NORM * calm / scale]) - rows[:, ~free] @ lower[~free]
         if free.any():
             answer[free] = lsq_linear(rows[:, free], rest, (lower[free], upper[free])).x
         moved = _towards(robot, pose, np.clip(answer * scale, *bounds))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..rod import EquilibriumError
-from ._case import CLOSE, FAR, Case, percent
+from ._case import CLOSE, Case, percent
 from ._finding import Finding
 from ._reach import farthest, ray
 
@@ -24,27 +24,24 @@ def start(case: Case) -> list[Finding]:
     except EquilibriumError as error:
         says = f"the task begins at {case.lengths(np.asarray(tip))}, but {error}"
         return [Finding("start", "infeasible", says, "a start nearer to rest, or larger input_bounds")]
-    share = _share(case, held.input)
+    share = case.share(held.input)
     return [Finding("start", "ok", f"{percent(share)} of the input bound holds it where the task begins")]
 
 
 def reach(case: Case) -> list[Finding]:
     """Can it be held at every point of the reference?"""
-    missed, asked = float(case.misses.max()), case.asked
-    worst = int(case.misses.argmax())
-    scale = max(asked, float(np.linalg.norm(case.far.output - case.rest.output)), 1e-12)
-    around = _around(case)
-    if missed <= CLOSE * scale:
+    missed, worst, around = float(case.misses.max()), int(case.misses.argmax()), _around(case)
+    if missed <= CLOSE * case.size:
         return [Finding("reach", "ok", f"all of the reference can be held{around}")]
     says = (
         f"the reference at {case.lengths(case.places[worst])} is {case.length(missed)} away from the nearest pose that "
         f"the inputs can hold{around}"
     )
-    got = max(float(np.linalg.norm(case.far.output - case.rest.output)), 1e-12)
     advice = "a smaller reference, larger input_bounds, or cables farther from the axis of a softer or longer arm"
-    if asked > _ANOTHER_UNIT * got:
-        advice = f"is the reference in {case.units.output}? It asks for {asked / got:.0f} times what the arm can do"
-    return [Finding("reach", "infeasible" if missed > FAR * scale else "doubtful", says, advice)]
+    if case.asked > _ANOTHER_UNIT * case.moved > 0:
+        times = f"{case.asked / case.moved:,.0f}"
+        advice = f"is the reference in {case.units.output}? It asks for {times} times what the arm can do"
+    return [Finding("reach", "doubtful" if case.holds else "infeasible", says, advice)]
 
 
 def pulling(case: Case) -> list[Finding]:
@@ -91,9 +88,8 @@ def holding(case: Case) -> list[Finding]:
     """What share of the input bound does it take to hold the reference?"""
     if not case.holds:
         return []  # said already: all of it is not enough
-    share = max(_share(case, pose.input) for pose in case.held)
-    says = f"holding the reference takes {percent(share)} of the input bound at most"
-    if share <= _TIGHT:
+    says = f"holding the reference takes {percent(case.effort)} of the input bound at most"
+    if case.effort <= _TIGHT:
         return [Finding("effort", "ok", says)]
     return [Finding("effort", "doubtful", f"{says}, which leaves little to steer with", "larger input_bounds")]
 
@@ -118,10 +114,6 @@ def gravity(case: Case) -> list[Finding]:
         says = f"{told}; it buckles at {times:.2f} times its weight"
         return [Finding("gravity", "doubtful", says, "a payload or a softer day may tip it: stiffer, shorter, lighter")]
     return [Finding("gravity", "ok", told + (f"; it buckles at {times:.3g} times its weight" if times < 1e3 else ""))]
-
-
-def _share(case: Case, given: np.ndarray) -> float:
-    return float(np.max(np.abs(given) / case.study.mpc.input_scale))
 
 
 def _around(case: Case) -> str:

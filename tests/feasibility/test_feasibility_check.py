@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from feasibility_support import MODEL, study, verdicts
 
-from socasadi import Circle, Cost, LaserSpot, Modal, Origin, Rod, SimulatedPlant
+from socasadi import Camera, Circle, Cost, LaserSpot, Modal, Origin, Rod, SimulatedPlant
 from socasadi.codegen import c_compiler
 from socasadi.feasibility import check
-from socasadi.rod import Material, Section, Strain, cables_around
+from socasadi.rod import Cable, Chamber, Material, Section, Strain, cables_around
 
 PAPER = Rod.preset("paper")
 WAND = Rod(
@@ -120,3 +120,18 @@ def test_the_advice_on_R_is_enough():
     assert verdicts(check(mended, quick=True))["cost weights"] == "ok"
     barely = study(cost=Cost(R=2 / times, input_term="literal"))
     assert verdicts(check(barely, quick=True))["cost weights"] == "doubtful"
+
+
+def test_robots_that_are_no_tendon_arms_are_judged_in_their_own_units():
+    """Winches, chambers and a camera on the same rod: all can do a small circle, and none is told of pulling."""
+    around = [(0.02 * np.cos(a), 0.02 * np.sin(a)) for a in np.radians([0, 120, 240])]
+    winches = replace(PAPER, cables=tuple(Cable(at, drive="length", stiffness=2e4) for at in around))
+    chambers = replace(PAPER, cables=tuple(Chamber(at, area=1e-4) for at in around))
+    small = Circle(radius=0.02)
+    for rod, bounds in ((winches, (0.58, 0.62)), (chambers, (0, 1e5))):
+        found = verdicts(check(study(rod=rod, input_bounds=bounds, task=small), quick=True))
+        assert found["reach"] == found["effort"] == found["speed"] == "ok"
+        assert "pulling" not in found
+    camera = SimulatedPlant(PAPER, output=Camera((1.6, 0, 0), (0.6, 0, 0), focal_length=500), noise=0.5)
+    seen = check(study(plant=camera, output_bounds=(-60, 60), task=Circle(radius=20.0)), quick=True)
+    assert "47.8 to 55.4 px" in next(finding.says for finding in seen.findings if finding.name == "reach")
