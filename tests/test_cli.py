@@ -297,5 +297,5 @@ def test_a_run_begun_by_python_goes_on_by_the_command_with_a_robot_of_ones_own(t
     assert subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True).returncode == 0
     again = socasadi("run", script, "--resume", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
-    for command in (["show", "runs/study"], ["plot", "runs/study"], ["export", "runs/study", "--out", "c"]):
+    for command in (["show", "runs/study"], ["export", "runs/study", "--out", "c"]):
         assert socasadi(*command, cwd=tmp_path).returncode == 0

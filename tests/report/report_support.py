@@ -9,7 +9,7 @@ MODEL = Modal.from_spec(length=0.6, bending_stiffness=0.64, mass_per_length=2.8,
 
 
 def small_run(folder):
-    """A run with its Sobol baseline, flights under fresh noise, and its controller in C."""
+    """A run with its Sobol baseline and flights under fresh noise."""
     study = Study(
         plant=SimulatedPlant(Rod.preset("paper")),
         mpc=LinearMPC(MODEL),
@@ -21,5 +21,4 @@ def small_run(folder):
     result = study.run(folder, progress=None)
     replace(study, search="sobol").run(folder / "sobol", progress=None)
     assess(result)
-    result.export(folder / "controller")
     return result

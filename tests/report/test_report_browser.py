@@ -84,7 +84,7 @@ def test_it_opens_from_disk_with_every_plot_drawn(browser):
     for name in ("scene", "plane", "outputs", "inputs", "convergence", "slices"):
         drawn = browser.execute_script("return document.getElementById(arguments[0]).data.length", name)
         assert drawn > 0, name
-    assert not browser.find_elements("id", "missing")
+    assert "the exported controller" in by_id(browser, "missing").text
 
 
 def test_play_moves_the_rod_in_time_and_pause_holds_it(browser):

@@ -18,7 +18,9 @@ from socasadi.report import html_report
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
-    return small_run(tmp_path_factory.mktemp("report") / "run")
+    result = small_run(tmp_path_factory.mktemp("report") / "run")
+    result.export(result.folder / "controller")
+    return result
 
 
 @pytest.fixture(scope="module")

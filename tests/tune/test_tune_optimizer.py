@@ -13,9 +13,9 @@ from socasadi.tune._belief import last_full_fit
 
 
 def test_branin_is_solved_in_30_trials_and_sobol_is_far():
-    """Of a function that spans 300 it ends within 0.01 of the minimum in the median of five seeds."""
-    found = [run(Optimizer(BRANIN, seed=seed, seed_points=6), branin, 30).best.cost for seed in range(5)]
-    sobol = [run(SobolSearch(BRANIN, seed=seed), branin, 30).best.cost for seed in range(5)]
+    """Of a function that spans 300 it ends within 0.01 of the minimum in the median of three seeds."""
+    found = [run(Optimizer(BRANIN, seed=seed, seed_points=6), branin, 30).best.cost for seed in range(3)]
+    sobol = [run(SobolSearch(BRANIN, seed=seed), branin, 30).best.cost for seed in range(3)]
     assert np.median(found) - BRANIN_MINIMUM < 0.01
     assert max(found) - BRANIN_MINIMUM < 0.05
     assert np.all(np.array(found) < sobol)
