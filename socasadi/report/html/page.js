@@ -113,7 +113,7 @@
     catch (error) { return false; }
   })();
   const VIEWS = {
-    side: { eye: { x: 1.6, y: -1.8, z: 0.45 }, up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: -0.1 } },
+    side: { eye: { x: 1.75, y: -1.95, z: 0.5 }, up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: -0.1 } },
     top: { eye: { x: 0, y: -0.01, z: 2.4 }, up: { x: 0, y: 1, z: 0 }, center: { x: 0, y: 0, z: 0 } },
   };
   // A rod that hangs is drawn hanging; with y turned round, too, nothing is mirrored.
