@@ -21,8 +21,10 @@ from pathlib import Path
 from shell import shell
 from tutorial_1_simulated_arm import study
 
+from socasadi.campaign import probe
 from socasadi.codegen import c_compiler
 from socasadi.export import toolchain
+from socasadi.model import identify
 
 # The firmware of section 5: the loop, and what it needs of the board.
 
@@ -134,13 +136,15 @@ def main() -> None:
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "runs/tutorial-3")
     folder.mkdir(parents=True, exist_ok=True)
 
-    # 1. A run folder is all that is needed; on another computer, too.
+    # 1. A run folder is all that is needed, on another computer, too. Without one: a few trials about the theta that fits
+    # 20 s of probing.
 
     if len(sys.argv) > 2:
         run = Path(sys.argv[2])
     else:
         run = folder / "run"
-        replace(study, seed_points=6, iterations=4).run(run, resume=True)
+        identified = identify(study.mpc.model, probe(study.plant, study.mpc.input_bounds))
+        replace(study, seed_points=3, iterations=3, initial=[identified]).run(run, resume=True)
 
     # 2. The best controller of the run as C99: it allocates nothing, has no recursion and no global state. The export
     # builds it at once and replays the run's best episode, and random samples that mostly run into the bounds.
