@@ -190,8 +190,8 @@ def main() -> None:
     # random samples, too        526,263 at worst, with 31 changes of the working set: size the timer for this line
     #
     # Instructions are counted exactly; they are not cycles. Allow two cycles each and a clock of 100 MHz: 0.4 ms in the
-    # median and 10.5 ms at worst, of a sample time of 50 ms. Where that is too long: LinearMPC(iteration_limit=20), then
-    # the clipped unconstrained law takes over; a shorter horizon or move blocking (control_horizon=4); or
+    # median and 10.5 ms at worst, of a sample time of 50 ms. Where that is too long: LinearMPC(iteration_limit=20), and
+    # then the clipped unconstrained law takes over; a shorter horizon or move blocking (control_horizon=4); or
     # Study(conditions=(IterationBound(40),)), which tries no theta that needs more.
 
     # 5. The loop around it. Yours is `firmware.c` with another `board.c`.
