@@ -8,7 +8,19 @@ from typing import Annotated
 
 import typer
 
-from ._terminal import RunFolder, StudyFile, StudyScript, distance, opened, out, outcome, print_theta, table
+from ._terminal import (
+    ProbeRecord,
+    RunFolder,
+    StudyFile,
+    StudyScript,
+    distance,
+    opened,
+    out,
+    outcome,
+    print_theta,
+    starting_from,
+    table,
+)
 from .campaign import (
     Asked,
     Bench,
@@ -38,13 +50,14 @@ def init(
     real: Annotated[
         str | None, typer.Option(help="What the controller's C computes in: double (default) or float.")
     ] = None,
+    record: ProbeRecord = None,
     resume: Annotated[bool, typer.Option("--resume", help="Change the iterations of a run that is there.")] = False,
 ) -> None:
     """Make a run whose trials are flown by hand or by another program: ask and tell bring them."""
     if real is not None:
         check_real(real)
         _check_compiler(real)
-    study = load_study(script)
+    study = starting_from(load_study(script), record)
     changes = {"iterations": iterations, "seed": seed}
     study = replace(study, **{name: value for name, value in changes.items() if value is not None})
     folder = folder or Path("runs") / script.stem
@@ -103,7 +116,9 @@ def ask(
     if as_json:
         print(json.dumps([bench.about(asked) for asked in given], indent=2))
         return
-    for asked in given:
+    for i, asked in enumerate(given):
+        if i:
+            out.print()
         _print_asked(bench, asked, trials)
     if len(given) < count:
         out.print(f"\nThese are all: the run has {trials} trials.")

@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
 
 from ._terminal import (
+    ProbeRecord,
     StudyFile,
     best_of,
     estimated,
@@ -23,6 +24,7 @@ from ._terminal import (
     print_verdicts,
     replay,
     spared,
+    starting_from,
 )
 from .campaign import (
     Assessment,
@@ -52,11 +54,12 @@ def run(
     start: Annotated[
         list[Path] | None, typer.Option(metavar="RUN", help="Earlier run whose best theta is tried first.")
     ] = None,
+    record: ProbeRecord = None,
 ) -> None:
     """Run a study: search, Sobol baseline, verification, figures, and the controller in C."""
     if jobs is not None and jobs < 1:
         raise RunError(f"--jobs is at least 1, not {jobs}")
-    study = load_study(script)
+    study = starting_from(load_study(script), record)
     given: dict[str, Any] = {"iterations": iterations, "seed": seed}
     if start:
         given["initial"] = (*(_best_theta(study, earlier) for earlier in start), *study.initial)
@@ -73,6 +76,7 @@ def run(
             _run(study, folder, resume, {"jobs": jobs, "executor": executor, "script": script})
     except KeyboardInterrupt:
         options = {"--iterations": iterations, "--seed": seed, "--out": folder, "--jobs": jobs, "--dask": dask}
+        options |= {"--record": record}
         given_options = [*options.items(), *(("--start", earlier) for earlier in start or ())]
         out.print(f"\nStopped. Every finished trial is stored; go on with: {_again(script, given_options)}")
         raise typer.Exit(130) from None

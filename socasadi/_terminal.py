@@ -14,15 +14,21 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
-from .campaign import Asked, Result, RunError, Study, Trial, Units, Verdict, clock, load_study
+from .campaign import Asked, Result, RunError, Study, Trial, Units, Verdict, clock, load_study, read_probe
 from .campaign.store import compare_settings, journal_path, read_settings
 from .export import NotBuiltError, build_and_replay
 from .feasibility import Finding
+from .model import identify
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="Python file that defines `study`.")]
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")]
 StudyScript = Annotated[
     Path | None, typer.Option("--study", help="Its script, where a part of the study is of your own making.")
+]
+
+ProbeRecord = Annotated[
+    Path | None,
+    typer.Option("--record", metavar="FILE", help="Probing record (CSV): what fits it is tried first."),
 ]
 
 # A file or a pipe has no width; a table must not be folded for it.
@@ -46,6 +52,13 @@ def opened(folder: Path, script: Path | None) -> Result:
     study = replace(load_study(script), **kept)
     compare_settings(folder, study.settings)
     return Result(study, folder)
+
+
+def starting_from(study: Study, record: Path | None) -> Study:
+    """The study with the theta within its bounds that fits a probing record best as its first point."""
+    if record is None:
+        return study
+    return replace(study, initial=(identify(study.mpc.model, read_probe(record, study)), *study.initial))
 
 
 def table(*headings: str, left: tuple[str, ...] = (), title: str = "") -> Table:

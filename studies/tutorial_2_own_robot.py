@@ -118,23 +118,12 @@ def main() -> None:
     probe("probe.csv")
     shell("socasadi check arm.py --spec arm.toml --record probe.csv")
 
-    # The record is worth more: the theta that fits it is a better first guess than any point of the box, and the
-    # search may start from it. Two lines more in arm.py do that. (Without a data sheet, the record makes the box, too:
+    # 4. The campaign. From here on the folder runs/arm is all that is needed: it may be copied, shared, or left for a
+    # month. The record is worth more than a check: the theta that fits it is a better first guess than any point of the
+    # box, so the search starts from it. (Without a data sheet the record makes the box, too:
     # socasadi.model.bounds_from_record.)
 
-    with open("arm.py", "a") as script:
-        script.write("""
-from dataclasses import replace
-from socasadi.campaign import read_probe
-from socasadi.model import identify
-
-study = replace(study, initial=[identify(model, read_probe("probe.csv", study))])
-""")
-
-    # 4. The campaign. From here on the folder runs/arm is all that is needed: it may be copied, shared, or left for a
-    # month.
-
-    shell("socasadi init arm.py")
+    shell("socasadi init arm.py --record probe.csv")
     study = load_study(Path("arm.py"))  # for `fly`: the controller and the task
 
     # The first trial is the identified theta. Fly it, bring the recording.

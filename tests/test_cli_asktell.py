@@ -246,6 +246,7 @@ def test_ask_says_what_to_do_next(at_the_bench, socasadi):
     header = Path("runs/study/asked/trial-001/controller_data.h").read_text()
     for name, value in about["theta"].items():
         assert f"{name} = {value!r}" in header
+    assert "\n\ntrial 3 of 6" in socasadi("ask", "runs/study", "--count", 2)
 
 
 def test_a_recording_that_ends_early_counts_once_it_proves_enough(at_the_bench, socasadi):

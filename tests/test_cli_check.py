@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from socasadi import Rod, SimulatedPlant, cli
-from socasadi.campaign import Episode, probe, write_recording
+from socasadi.campaign import Campaign, Episode, Result, probe, read_probe, write_recording
+from socasadi.model import identify
 
 ROOT = Path(__file__).parent.parent
 EXTERNAL = """
@@ -102,3 +103,13 @@ def test_a_slip_is_answered_in_a_sentence(socasadi, tmp_path, arguments, fault):
     assert done.returncode != 0
     assert fault in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_campaign_starts_from_what_fits_the_record(socasadi, tmp_path, recorded):
+    (tmp_path / "arm.py").write_text(EXTERNAL.format(radius=0.05))
+    done = socasadi("init", "arm.py", "--record", recorded, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    result = Result.open(tmp_path / "runs" / "arm")
+    with Campaign.open(tmp_path / "runs" / "arm") as campaign:
+        first = campaign.ask().theta
+    assert first == pytest.approx(identify(result.study.mpc.model, read_probe(recorded, result.study)))
