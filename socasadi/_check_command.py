@@ -8,7 +8,6 @@ import typer
 from ._terminal import StudyFile, out, print_check
 from .campaign import load_study, read_probe
 from .feasibility import Check, check, read_spec_sheet
-from .report import reach_figure, save_figures
 
 
 def check_(
@@ -33,6 +32,8 @@ def check_(
     print_check(found.findings)
     out.print(_summary(found))
     if found.picture is not None:
+        from .report import reach_figure, save_figures  # matplotlib takes its time
+
         folder = figures or Path("runs") / f"{script.stem}-check"
         out.print(f"picture: {save_figures({'reach': reach_figure(found.picture)}, folder)[0]}")
     if found.verdict == "infeasible":

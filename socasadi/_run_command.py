@@ -40,7 +40,6 @@ from .campaign import (
     progress_line,
 )
 from .feasibility import check
-from .report import figures, save_figures
 
 
 def run(
@@ -84,6 +83,8 @@ def run(
 
 
 def _run(study: Study, folder: Path, resume: bool, flown: dict[str, Any]) -> None:
+    from .report import figures, save_figures  # matplotlib takes its time
+
     with _progress("search") as progress:
         result = study.run(folder, resume=resume, progress=progress, **flown)
     with _progress("Sobol points, the baseline") as progress:

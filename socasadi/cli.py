@@ -43,7 +43,6 @@ from .campaign import (
 from .codegen import CompilationError
 from .export import ExportError
 from .plant import ExternalPlantError
-from .report import animate, figures, html_report, save_figures
 
 app = typer.Typer(
     help="Tune a soft robot's model predictive controller in closed loop, and get it as C.",
@@ -118,6 +117,8 @@ def plot(
     script: StudyScript = None,
 ) -> None:
     """Draw the figures of a run again, or an animation of one episode."""
+    from .report import animate, figures, save_figures  # matplotlib takes its time
+
     result = opened(run_folder, script)
     if animation is not None:
         with counting(f"frames of {animation}") as progress:
@@ -139,6 +140,8 @@ def report(
     script: StudyScript = None,
 ) -> None:
     """Write a run as one HTML file that opens from disk: all its figures, and the rod moving."""
+    from .report import html_report
+
     with out.status("reporting"):
         written = html_report(run_folder, file, None if script is None else opened(run_folder, script).study)
     out.print(f"{written}: {written.stat().st_size / 1e6:.1f} MB, for any browser")

@@ -88,7 +88,13 @@ def test_within_the_rod_equations_follow_from_the_body_and_never_the_other_way()
         assert not any(module[:3] == ("socasadi", "rod", "mechanics") for module in modules(file)), file.name
 
 
-def test_importing_the_package_leaves_the_slow_parts_for_later():
-    slow = ("GPy", "matplotlib", "rich", "scipy.stats", "typer")
-    code = f"import sys, socasadi; print([m for m in {slow} if m in sys.modules])"
+@pytest.mark.parametrize(
+    ("module", "slow"),
+    [
+        ("socasadi", ("GPy", "matplotlib", "rich", "scipy.stats", "typer")),
+        ("socasadi.cli", ("GPy", "matplotlib", "plotly", "scipy.stats")),
+    ],
+)
+def test_importing_leaves_the_slow_parts_for_later(module, slow):
+    code = f"import sys, {module}; print([m for m in {slow} if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"

@@ -32,6 +32,7 @@ def page_data(pieces: Pieces, room: int) -> Data:
             episodes[str(number)] = data = _episode(episode)
             spent += _size(data)
     chosen = pieces.chosen or pieces.best
+    points = next((data["shapes"]["shape"][1] for data in episodes.values() if "shapes" in data), 0)
     return {
         "unit": {"factor": factor, "output": shown, "input": units.input},
         "trials": [_trial(trial, pieces.kept(trial)) for trial in pieces.trials],
@@ -41,7 +42,7 @@ def page_data(pieces: Pieces, room: int) -> Data:
         "episodes": episodes,
         "reference": _reference(pieces),
         "limits": _limits(pieces),
-        "rod": _rod(pieces.rod_plant, study.mpc.input_scale) if pieces.rod_plant and study else None,
+        "rod": _rod(pieces.rod_plant, study.mpc.input_scale, points) if pieces.rod_plant and study and points else None,
         "slices": _slices(pieces),
     }
 
@@ -118,9 +119,9 @@ def _limits(pieces: Pieces) -> Data:
     }
 
 
-def _rod(plant: SimulatedPlant, scale: np.ndarray) -> Data:
+def _rod(plant: SimulatedPlant, scale: np.ndarray, points: int) -> Data:
     """What a rod's body is drawn from, at the points of the recorded shapes."""
-    rod, points = plant.rod, 15
+    rod = plant.rod
     places = np.linspace(0.0, rod.length, points)
     edges = np.cumsum([0.0, *(division.length for division in rod.divisions)])
     half = []
