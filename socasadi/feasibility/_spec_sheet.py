@@ -16,6 +16,8 @@ _NEEDED = {
     "mass_per_length": "kg/m",
     "cable_offset": "m",
 }
+_SLENDER = (1.0, 1000.0)
+"""Between which the length over the cables' offset lies; beyond, one of the two is in another unit."""
 _OPTIONAL: dict[str, Any] = {
     "radius": None,
     "cable_angles": [0.0, 120.0, 240.0],
@@ -62,6 +64,12 @@ def read_spec_sheet(path: str | Path, sample_time: float) -> SimulatedPlant:
     for name in (*_NEEDED, "damping_ratio"):
         if not (isinstance(sheet[name], int | float) and sheet[name] > 0):
             raise SpecSheetError(f"{path}: {name} is {sheet[name]!r}, but must be a number above zero")
+    slender = sheet["length"] / sheet["cable_offset"]
+    if not _SLENDER[0] <= slender <= _SLENDER[1]:
+        raise SpecSheetError(
+            f"{path}: length is {sheet['length']:g} m and cable_offset {sheet['cable_offset']:g} m, a ratio of "
+            f"{slender:,.3g}, and no soft arm is so made: are both in m?"
+        )
     angles = sheet["cable_angles"]
     if not (isinstance(angles, list) and angles and all(isinstance(angle, int | float) for angle in angles)):
         raise SpecSheetError(f"{path}: cable_angles is {angles!r}, but must be a list of degrees, one a cable")

@@ -120,6 +120,7 @@ def test_a_robot_is_known_from_its_data_sheet(tmp_path):
         (SHEET + "colour = 'red'", "'colour', which no data sheet has"),
         (SHEET.replace("0.02", "-0.02"), "cable_offset is -0.02"),
         (SHEET.replace("0.02", "'2 cm'"), "cable_offset is '2 cm'"),
+        (SHEET.replace("length = 0.6", "length = 600"), "are both in m"),
         (SHEET + "poisson = 0.9", "poisson"),
         (SHEET + "gravity = 9.81", "gravity"),
         (SHEET + "cable_angles = ['up']", "cable_angles"),
