@@ -26,7 +26,7 @@ def arithmetic(case: Case, theta: np.ndarray) -> list[Finding]:
     loop = _loop(case, controller)
     if loop.verdict != "ok":
         return [loop]
-    settled = [] if case.noise is None else [_settled(case, controller)]
+    settled = [] if case.noise is None or not case.asked else [_settled(case, controller)]
     return [loop, *settled, *_precision(controller, record)]
 
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from ..campaign import Cost, Study, Units
 from ..model import Record, StateSpace
-from ..rod import EquilibriumError
+from ..rod import Cable, EquilibriumError
 from ._known import RodRobot
 from ._optimum import Optimum, optimum
 from ._reach import Bounds, nearest, reachable
@@ -54,7 +54,7 @@ class Case:
         """The bounds if the inputs could only pull; None where they are no tensions, or only pull or push as it is."""
         lower, upper = self.bounds
         cables = self.of_a_rod.rod.cables if self.of_a_rod else ()
-        if self.units.input != "N" or any(getattr(cable, "drive", "") != "tension" for cable in cables):
+        if self.units.input != "N" or not all(isinstance(cable, Cable) for cable in cables):
             return None
         return (np.maximum(lower, 0.0), upper) if (lower < 0).any() and (upper > 0).all() else None
 
@@ -184,15 +184,16 @@ class Case:
 
     def best_flight(self, cost: Cost) -> Optimum:
         """The flight of least J on the robot's linear model about rest."""
-        rest = self.rest
-        return optimum(
-            self.linear,
-            self.reference[1:] - rest.output,
-            cost,
-            self.study.mpc.input_scale,
-            self.begun.input - rest.input,
-            rest.input,
-        )
+        key = (cost.input_term, np.asarray(cost.Q, dtype=float).tobytes(), np.asarray(cost.R, dtype=float).tobytes())
+        if key not in self._flights:
+            rest, scale = self.rest, self.study.mpc.input_scale
+            wanted, start = self.reference[1:] - rest.output, self.begun.input - rest.input
+            self._flights[key] = optimum(self.linear, wanted, cost, scale, start, rest.input)
+        return self._flights[key]
+
+    @cached_property
+    def _flights(self) -> dict[tuple[str, bytes, bytes], Optimum]:
+        return {}
 
     def followed(self, flight: Optimum) -> float:
         """What share of the way that the task asks for a flight goes: 1 is all, 0 is not to move."""

@@ -12,11 +12,15 @@ from ._finding import Finding
 _FOLLOWED, _TRAPPED = 0.95, 0.8
 """Shares of the way that the cost's own optimum goes: ``ok`` from the first, ``infeasible`` below the second."""
 _EXACT = 0.995
+_SMALLEST = -8.0
+"""Logarithm of the smallest factor on R that is tried."""
 _HOPELESS = 1.5
 """Share of the input bound from which on a reference is too fast."""
 _SAMPLES_A_PERIOD = (4.0, 10.0)
 _LOUD = (0.2, 0.5)
 """Noise (standard deviation of a distance) as a share of what is asked for: doubtful, and infeasible, from there."""
+_SCATTER = 0.2
+"""Standard deviation of J from flight to flight, as a share of J, from which on trials cannot be told apart."""
 
 
 def following(case: Case) -> list[Finding]:
@@ -38,12 +42,13 @@ def timing(case: Case) -> list[Finding]:
     frequency, ratio = case.robot.slowest(case.rest)
     if not frequency:
         return []  # not stable at rest, which is said elsewhere
-    period = 1 / frequency
+    # Of a mode that does not swing the slow time constant counts, as an oscillation that would be as slow.
+    period = (ratio + np.sqrt(ratio**2 - 1)) / frequency if ratio >= 1 else 1 / frequency
     samples, seen = period / mpc.sample_time, mpc.horizon * mpc.sample_time / period
     mode = f"the first mode has {frequency:.3g} Hz and a damping ratio of {ratio:.2g}"
     says = f"{mode}: {samples:.3g} samples a period"
     few, enough = _SAMPLES_A_PERIOD
-    if samples >= enough or ratio >= 1:
+    if samples >= enough:
         findings = [Finding("sample time", "ok", says)]
     else:
         advice = f"a sample time of {period / enough:.2g} s or less"
@@ -51,7 +56,7 @@ def timing(case: Case) -> list[Finding]:
     says = f"{mpc.horizon} samples are {seen:.2g} of its period"
     if mpc.terminal is not None:
         findings.append(Finding("horizon", "ok", f"{says}; what comes after is in the terminal cost"))
-    elif seen >= 0.5 or ratio >= 1:
+    elif seen >= 0.5:
         findings.append(Finding("horizon", "ok", says))
     else:
         advice = f"terminal='riccati', or a horizon of {round(0.5 * samples)} samples"
@@ -65,26 +70,30 @@ def noise(case: Case) -> list[Finding]:
         return [Finding("noise", "unknown", "nothing is known of the sensor's noise", "bring a probing record")]
     mpc, cost = case.study.mpc, case.study.cost
     Q, samples = weight_matrix(cost.Q, mpc.outputs, "Q of the cost"), len(case.reference) - 1
-    floor = samples * float(np.trace(Q)) * case.noise**2
-    best = case.best_flight(cost).J
-    distance = case.noise * np.sqrt(mpc.outputs)
-    reached = case.moved
-    told = case.length(case.noise)
-    says = f"{told} of it puts a floor of {floor:.3g} under J, beside {best:.3g} that the best flight costs"
-    asked = min(case.asked, reached) if reached else case.asked
-    share = distance / asked if asked else 0.0
+    floor, best = samples * float(np.trace(Q)) * case.noise**2, case.best_flight(cost).J
+    spread = float(np.sqrt(2 * samples * np.sum(Q**2))) * case.noise**2
+    says = f"{case.length(case.noise)} of it puts a floor of {floor:.3g} under J, beside {best:.3g} of the best flight"
+    share = case.noise * np.sqrt(mpc.outputs) / case.asked if case.asked else 0.0
+    if case.noise > case.moved > 0:
+        says += f"; that is more than the {case.length(case.moved)} that the robot can move"
+        return [Finding("noise", "infeasible", says, "a better sensor")]
     if share > _LOUD[0]:
-        than = "more than" if case.noise > reached else f"{percent(case.noise / reached)} of"
-        says += f"; that is {than} the {case.length(reached)} that the robot can move towards the reference"
+        says += f"; a measurement is off by {percent(share)} of the {case.length(case.asked)} that the task asks for"
         return [Finding("noise", "infeasible" if share > _LOUD[1] else "doubtful", says, "a better sensor")]
-    if floor > best > 0:
-        says += ": most of J will be noise, and trials differ little in the rest"
+    says += f", and moves J by {spread:.2g} from flight to flight"
+    if spread > _SCATTER * (floor + best):
         return [Finding("noise", "doubtful", says, "a better sensor, or a longer or larger task")]
     return [Finding("noise", "ok", says)]
 
 
 def _speed(case: Case) -> list[Finding]:
-    flight = case.best_flight(_lighter(case, case.study.cost, _EXACT)[1])
+    mpc = case.study.mpc
+    frequency, _ = case.robot.slowest(case.rest)
+    skipped = int(case.settled.argmax()) * mpc.sample_time
+    lighter = _lighter(case, case.study.cost, _EXACT)
+    if lighter is None or not frequency or skipped < 1 / frequency:
+        return []  # the jump at the start is not over
+    flight = case.best_flight(lighter[1])
     # A robot that only pulls cannot fly this very flight, for it has no bounds: what counts is by how much its inputs
     # are larger than those that would do if the reference stood still.
     A, B, C, D = case.linear
@@ -94,11 +103,17 @@ def _speed(case: Case) -> list[Finding]:
     largest = float(np.linalg.norm(standing, axis=1).max())
     times = float(np.linalg.norm(moving, axis=1).max()) / largest if largest else 1.0
     share = case.effort * max(times, 1.0)
-    says = f"following the reference as fast as it moves takes {percent(share)} of the input bound"
+    says, advice = f"following the reference as fast as it moves takes {percent(share)} of the input bound", ""
+    if mpc.rate_limits is not None:
+        rates = np.diff(moving, axis=0) / mpc.sample_time
+        hasty = float(np.max(np.where(rates > 0, rates / mpc.rate_limits[1], rates / mpc.rate_limits[0])))
+        says += f" and {percent(hasty)} of the rate bound"
+        if hasty > max(share, 1):
+            share, advice = hasty, "a slower reference, or larger rate_bounds"
     if share <= 1:
         return [Finding("speed", "ok", says)]
     verdict = "infeasible" if share > _HOPELESS else "doubtful"
-    return [Finding("speed", verdict, says, "a slower reference, or larger input_bounds")]
+    return [Finding("speed", verdict, says, advice or "a slower reference, or larger input_bounds")]
 
 
 def _weighed(case: Case, cost: Cost, name: str) -> Finding:
@@ -106,8 +121,10 @@ def _weighed(case: Case, cost: Cost, name: str) -> Finding:
     says = f"the flight of least cost goes {percent(share)} of the way that the task asks for"
     if share >= _FOLLOWED:
         return Finding(name, "ok", says)
-    factor, _ = _lighter(case, cost, _FOLLOWED)
-    advice = f"R {_times(1 / factor)} times smaller"
+    lighter = _lighter(case, cost, _FOLLOWED)
+    advice = (
+        f"R {_times(1 / lighter[0])} times smaller" if lighter else "a task or inputs that fit each other: no R does"
+    )
     if cost.input_term != "rate":
         what = "in newtons" if cost.input_term == "literal" else "in shares of its bound"
         says += f": R weighs the input {what}, and not to move is cheap"
@@ -115,8 +132,8 @@ def _weighed(case: Case, cost: Cost, name: str) -> Finding:
     return Finding(name, "infeasible" if share < _TRAPPED else "doubtful", says, advice)
 
 
-def _lighter(case: Case, cost: Cost, share: float) -> tuple[float, Cost]:
-    """The cost with just so small an R that its optimum goes that share of the way, and the factor on R."""
+def _lighter(case: Case, cost: Cost, share: float) -> tuple[float, Cost] | None:
+    """The cost with just so small an R that its optimum goes that share of the way, and the factor on R, if any has."""
     R = np.asarray(cost.R, dtype=float)
 
     def scaled(exponent: float) -> Cost:
@@ -124,7 +141,9 @@ def _lighter(case: Case, cost: Cost, share: float) -> tuple[float, Cost]:
 
     if case.followed(case.best_flight(cost)) >= share:
         return 1.0, cost
-    low, high = -8.0, 0.0
+    low, high = _SMALLEST, 0.0
+    if case.followed(case.best_flight(scaled(low))) < share:
+        return None
     while high - low > 0.05:
         middle = (low + high) / 2
         low, high = (middle, high) if case.followed(case.best_flight(scaled(middle))) >= share else (low, middle)

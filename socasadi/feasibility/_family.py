@@ -51,9 +51,11 @@ def family(case: Case, found: list[Fit]) -> list[Finding]:
             if free.share < _BETTER * fit.share:
                 outside |= _outside(case, free.theta)
     if outside:
-        listed = ", ".join(entry.name for entry in model.entries if entry.name in outside)
-        says = f"{says}; a better one lies outside"
-        return [Finding("model", "doubtful" if verdict == "ok" else verdict, says, f"wider bounds of {listed}")]
+        listed = [entry for entry in model.entries if entry.name in outside]
+        says, advice = f"{says}; a better one lies outside", f"wider bounds of {', '.join(e.name for e in listed)}"
+        if all(entry.scale == "linear" for entry in listed):
+            advice = f"the sign, order and unit of inputs and outputs; if they are right, {advice}"
+        return [Finding("model", "doubtful" if verdict == "ok" else verdict, says, advice)]
     return [Finding("model", verdict, says, "" if verdict == "ok" else "a family of a higher order")]
 
 

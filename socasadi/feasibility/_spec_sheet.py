@@ -1,7 +1,7 @@
 """A robot from its data sheet."""
 
 import tomllib
-from math import pi, sqrt
+from math import isfinite, pi, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,8 @@ def read_spec_sheet(path: str | Path, sample_time: float) -> SimulatedPlant:
         given = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise SpecSheetError(f"there is no data sheet {path}") from None
+    except IsADirectoryError:
+        raise SpecSheetError(f"{path} is a directory, not a data sheet") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise SpecSheetError(f"{path} is no TOML: {error}") from None
     known = ", ".join([*(f"{name} ({unit})" for name, unit in _NEEDED.items()), *_OPTIONAL])
@@ -61,9 +63,10 @@ def read_spec_sheet(path: str | Path, sample_time: float) -> SimulatedPlant:
     if missing := [name for name in _NEEDED if name not in given]:
         raise SpecSheetError(f"{path} lacks {', '.join(missing)}; a data sheet has {known}")
     sheet = {**_OPTIONAL, **given}
-    for name in (*_NEEDED, "damping_ratio"):
-        if not (isinstance(sheet[name], int | float) and sheet[name] > 0):
-            raise SpecSheetError(f"{path}: {name} is {sheet[name]!r}, but must be a number above zero")
+    for name in (*_NEEDED, "damping_ratio", "radius"):
+        value = sheet[name]
+        if value is not None and not (isinstance(value, int | float) and isfinite(value) and value > 0):
+            raise SpecSheetError(f"{path}: {name} is {value!r}, but must be a finite number above zero")
     slender = sheet["length"] / sheet["cable_offset"]
     if not _SLENDER[0] <= slender <= _SLENDER[1]:
         raise SpecSheetError(

@@ -12,6 +12,8 @@ _TIGHT = 0.85
 """Share of the input bound from which on holding leaves too little to steer with."""
 _NOISE_MARGIN = 3.0
 _WEIGHT_MARGIN = 1.5
+_STRAIGHT = 1e-3
+"""Share of the length by which the tip of a straight rod may be off the axis."""
 
 
 def start(case: Case) -> list[Finding]:
@@ -46,7 +48,7 @@ def reach(case: Case) -> list[Finding]:
 
 def pulling(case: Case) -> list[Finding]:
     """Do the cables have to push?"""
-    if case.pulling is None or case.study.mpc.outputs != 2:
+    if case.pulling is None or case.study.mpc.outputs != 2 or len(case.corners(case.pulling)) < 3:
         return []
     least, most = _radii(case, case.pulling)
     upper = float(case.pulling[1].max())
@@ -95,31 +97,34 @@ def holding(case: Case) -> list[Finding]:
 
 
 def gravity(case: Case) -> list[Finding]:
-    """Does it stand up to its own weight?"""
+    """Does it stand up to its own weight and its loads?"""
     robot = case.of_a_rod
     if robot is None:
         return []
-    if not any(robot.rod.gravity) and not robot.rod.payloads:
-        return [Finding("gravity", "ok", "none in this model")]
-    rest = case.rest.equilibrium
+    rod, rest = robot.rod, case.rest.equilibrium
     assert rest is not None
+    off = float(np.linalg.norm(rod.in_base_frame(rest.tip)[1:]))
+    straight = off < _STRAIGHT * rod.length
     # Loads enter the tangent stiffness in proportion, as long as the rod stays straight.
-    times = 1 / (1 - rest.stability) if rest.stability < 1 else np.inf
+    times = 1 / (1 - rest.stability) if rest.stability < 1 and straight else np.inf
     if rest.stability <= 0:
-        says = f"the arm buckles under its own weight: it stands up to {times:.2g} times that"
+        stands = f": it stands up to {times:.2g} times that" if np.isfinite(times) else ""
+        says = f"the arm buckles under its own weight and loads{stands}"
         return [Finding("gravity", "infeasible", says, "a stiffer, shorter or lighter arm, or one that hangs")]
-    moved = robot.rod.in_base_frame(rest.tip)[1:]
-    told = f"at rest its tip is {1e3 * np.linalg.norm(moved):.3g} mm off the axis"
+    if not any(rod.gravity) and not rod.payloads and not rod.loads:
+        return [Finding("gravity", "ok", "neither weight nor loads in this model")]
+    told = "at rest it is straight" if straight else f"at rest its tip is {1e3 * off:.3g} mm off the axis"
     if times < _WEIGHT_MARGIN:
-        says = f"{told}; it buckles at {times:.2f} times its weight"
+        says = f"{told}; it buckles at {times:.2f} times its weight and loads"
         return [Finding("gravity", "doubtful", says, "a payload or a softer day may tip it: stiffer, shorter, lighter")]
-    return [Finding("gravity", "ok", told + (f"; it buckles at {times:.3g} times its weight" if times < 1e3 else ""))]
+    buckles = f"; it buckles at {times:.3g} times its weight and loads" if times < 1e3 else ""
+    return [Finding("gravity", "ok", f"{told}{buckles}")]
 
 
 def _around(case: Case) -> str:
-    """How far it reaches in the plane, to be added to a sentence."""
+    """How far it reaches, to be added to a sentence."""
     p = case.study.mpc.outputs
-    if p == 2:
+    if p == 2 and len(case.corners(case.bounds)) > 2:
         return f"; the robot reaches {case.span(*_radii(case, case.bounds))} around rest"
     ends = [
         farthest(case.robot, sign * axis, case.bounds, case.rest).output[i]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..codegen import Buffered, compiled
-from ..rod import Rod
+from ..rod import Chamber, Rod
 from ._output import Output, TipDisplacement
 from ._protocol import PlantFailure
 
@@ -79,6 +79,12 @@ class SimulatedPlant:
     def output_unit(self) -> str:
         """Unit of the measured values."""
         return getattr(self.output, "unit", "m")
+
+    @property
+    def input_unit(self) -> str:
+        """Unit of the inputs: N of tensions, m of lengths, Pa of pressures; none where they differ."""
+        units = {"Pa" if isinstance(c, Chamber) else "m" if c.drive == "length" else "N" for c in self.rod.cables}
+        return units.pop() if len(units) == 1 else ""
 
     @property
     def tension(self) -> np.ndarray:

@@ -69,7 +69,7 @@ def animate(
     """
     file = Path(file)
     write = film_writer(file)
-    rate = RATES[file.suffix]
+    rate = RATES[file.suffix.lower()]
     number = result.best.number if trial is None else trial
     episode = result.episode(number)
     if (outputs := result.study.mpc.outputs) != 2:

@@ -25,9 +25,9 @@ def film_writer(file: Path) -> Callable[[Iterable[np.ndarray], float], None]:
     ValueError
         The suffix is neither .gif nor .mp4, or there is no ffmpeg for an .mp4.
     """
-    if file.suffix not in RATES:
+    if file.suffix.lower() not in RATES:
         raise ValueError(f"the animation {file} ends in {file.suffix!r}; take {' or '.join(RATES)}")
-    ffmpeg = _ffmpeg() if file.suffix == ".mp4" else ""
+    ffmpeg = _ffmpeg() if file.suffix.lower() == ".mp4" else ""
 
     def write(frames: Iterable[np.ndarray], rate: float) -> None:
         file.parent.mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,7 @@ from feasibility_support import MODEL, study, verdicts
 from socasadi import Camera, Circle, Cost, LaserSpot, Modal, Origin, Rod, SimulatedPlant
 from socasadi.codegen import c_compiler
 from socasadi.feasibility import check
-from socasadi.rod import Cable, Chamber, Material, Section, Strain, cables_around
+from socasadi.rod import Cable, Chamber, Material, PointLoad, Section, Strain, cables_around
 
 PAPER = Rod.preset("paper")
 WAND = Rod(
@@ -135,3 +135,50 @@ def test_robots_that_are_no_tendon_arms_are_judged_in_their_own_units():
     camera = SimulatedPlant(PAPER, output=Camera((1.6, 0, 0), (0.6, 0, 0), focal_length=500), noise=0.5)
     seen = check(study(plant=camera, output_bounds=(-60, 60), task=Circle(radius=20.0)), quick=True)
     assert "47.8 to 55.4 px" in next(finding.says for finding in seen.findings if finding.name == "reach")
+
+
+def test_a_load_buckles_an_arm_as_its_weight_does_and_a_bent_one_is_told_no_factor():
+    """Euler's load of a clamped column is pi^2 E I / (4 L^2) = 4.36 N."""
+
+    def of_gravity(rod):
+        return next(
+            f for f in check(study(rod=rod, task=Circle(radius=0.01)), quick=True).findings if f.name == "gravity"
+        )
+
+    assert of_gravity(replace(PAPER, loads=(PointLoad(force=(-6.0, 0.0, 0.0)),))).verdict == "infeasible"
+    pressed = of_gravity(replace(PAPER, loads=(PointLoad(force=(-2.0, 0.0, 0.0)),)))
+    times = float(pressed.says.split("buckles at ")[1].split(" times")[0])
+    assert times == pytest.approx(np.pi**2 * 0.6362 / (4 * 0.6**2) / 2, rel=0.02)
+    sideways = of_gravity(replace(PAPER, gravity=(0.0, 0.0, -2.0)))
+    assert "138 mm off the axis" in sideways.says
+    assert "buckles" not in sideways.says
+
+
+def test_noise_counts_by_what_it_does_to_J_not_by_its_floor():
+    """A constant harms no search: a small circle under 1 mm is sound, and so is the way to the origin."""
+    assert verdicts(check(study(task=Circle(radius=0.012)), quick=True))["noise"] == "ok"
+    assert verdicts(check(study(task=Origin()), quick=True))["noise"] == "ok"
+
+
+def test_rates_that_are_too_slow_are_named():
+    slow = check(study(rate_bounds=(-0.01, 0.01)), quick=True).objections[0]
+    assert (slow.name, slow.verdict) == ("speed", "infeasible")
+    assert "rate_bounds" in slow.advice
+
+
+def test_one_cable_reaches_along_a_line():
+    one = study(
+        rod=replace(PAPER, cables=cables_around(1, 0.02)), model=Modal(axes=2, inputs=1), task=Circle(radius=0.02)
+    )
+    (finding,) = [f for f in check(one, quick=True).findings if f.name == "reach"]
+    assert finding.verdict == "infeasible"
+    assert "-56.6 to 56.2 mm" in finding.says
+
+
+def test_nothing_is_told_of_a_speed_that_the_jump_at_the_start_hides():
+    assert "speed" not in verdicts(check(study(task=Circle(duration=1.0)), quick=True))
+
+
+def test_a_mode_that_does_not_swing_is_sampled_by_its_time_constant():
+    honey = replace(PAPER, material=Material(young=1e6, poisson=0.5, density=1000.0, damping=2.2e5))
+    assert verdicts(check(study(rod=honey, sample_time=2.0), quick=True))["sample time"] == "infeasible"

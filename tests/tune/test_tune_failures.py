@@ -81,12 +81,12 @@ def test_after_a_few_successes_among_failures_it_goes_on_to_succeed_and_to_impro
 
     start = [[0.7, 0.3], [0.65, 0.33], [0.72, 0.22]]
     successes = 0
-    for seed in range(4):
+    for seed in range(2):
         search = Optimizer(cube(2), seed=seed, seed_points=8, initial=start)
         run(search, lambda theta: 1.0 + float(theta[0] + theta[1]), 20, fails)
         successes += sum(not trial.failed for trial in search.trials[8:])
         assert search.best.cost < 1.93  # 1.788 at the disc's best, 1.94 at the best of the first three
-    assert successes >= 6  # 3.4 of 48 at random
+    assert successes >= 3  # 1.7 of 24 at random
 
 
 def test_only_the_first_trials_succeed_and_it_goes_on_asking_new_points():

@@ -163,7 +163,7 @@ def test_four_at_a_time_need_no_more_than_half_as_many_again_in_the_median():
     assert four <= 1.5 * one
 
 
-@pytest.mark.parametrize("size", [4, 8])
+@pytest.mark.parametrize("size", [4, pytest.param(8, marks=pytest.mark.slow)])
 def test_batches_meet_processes_of_every_kind(size):
     """Points that are asked at once see one and the same process; it must not be of one kind in every batch."""
     search = Optimizer(cube(2), seed=0, seed_points=size)

@@ -184,6 +184,8 @@ def _table(path: Path) -> tuple[list[str], list[_Row]]:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise RecordingError(f"there is no recording {path}") from None
+    except IsADirectoryError:
+        raise RecordingError(f"{path} is a directory, not a recording") from None
     except UnicodeDecodeError:
         raise RecordingError(f"{path} is no text in UTF-8: save the recording as CSV") from None
     lines = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
@@ -231,7 +233,8 @@ def _placed(path: Path, headings: list[str], columns: dict[str, str], optional: 
     missing = [name for name in columns if name not in found]
     if missing and set(missing) != optional:
         first = f" (its first line is {','.join(headings)[:80]!r})" if len(missing) == len(columns) else ""
-        raise RecordingError(f"{path} lacks {_list(missing)}{first}; the columns are {_list(columns)}")
+        needed = [name for name in missing if name not in optional] or missing
+        raise RecordingError(f"{path} lacks {_list(needed)}{first}; the columns are {_list(columns)}")
     return found
 
 

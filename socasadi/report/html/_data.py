@@ -25,12 +25,14 @@ def page_data(pieces: Pieces, room: int) -> Data:
     factor, shown = units.shown
     episodes, spent = {}, 0
     for number in _order(pieces):
-        if spent > room:
-            break
         episode = pieces.episode(number)
-        if episode is not None and len(episode.output) > 1:
-            episodes[str(number)] = data = _episode(episode)
-            spent += _size(data)
+        if episode is None or len(episode.output) < 2:
+            continue
+        data = _episode(episode)
+        if episodes and spent + _size(data) > room:
+            break
+        episodes[str(number)] = data
+        spent += _size(data)
     chosen = pieces.chosen or pieces.best
     points = next((data["shapes"]["shape"][1] for data in episodes.values() if "shapes" in data), 0)
     return {
@@ -48,10 +50,16 @@ def page_data(pieces: Pieces, room: int) -> Data:
 
 
 def packed(values: np.ndarray) -> Data:
-    """An array in 16 bits a number: exact to a part in 65,000 of the largest."""
-    values = np.nan_to_num(np.asarray(values, dtype=float))
-    scale = float(np.abs(values).max(initial=0.0)) / 32767 or 1.0
-    whole = np.rint(values / scale).astype("<i2")
+    """An array in 16 bits a number: exact to a part in 65,000 of the largest; the least stands for what is not finite.
+
+    What is more than a thousand times the median is clipped, so that a robot that flew apart is seen until it did.
+    """
+    values = np.asarray(values, dtype=float)
+    size = np.abs(values[np.isfinite(values)])
+    largest = min(float(size.max(initial=0.0)), 1e3 * float(np.median(size)) if size.any() else np.inf)
+    scale = (largest or float(size.max(initial=0.0))) / 32767 or 1.0
+    with np.errstate(invalid="ignore"):
+        whole = np.where(np.isfinite(values), np.clip(np.rint(values / scale), -32767, 32767), -32768).astype("<i2")
     return {"shape": values.shape, "scale": scale, "data": base64.b64encode(whole.tobytes()).decode("ascii")}
 
 

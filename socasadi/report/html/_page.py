@@ -65,6 +65,8 @@ def html_report(folder: str | Path, file: str | Path | None = None, study: Study
     # A sign that would end the script element does not occur in JSON but within texts.
     page = template.render(**around, missing=pieces.missing, data=data.replace("<", "\\u003c"))
     file = Path(file) if file else folder / "report.html"
+    if file.is_dir():
+        raise ValueError(f"{file} is a folder; name a file in it, such as {file / 'report.html'}")
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_name(f"{file.name}.part")
     try:
@@ -87,17 +89,24 @@ def _told(pieces: Pieces) -> dict[str, Any]:
     tiles = []
     if best is not None:
         tiles.append(("best J observed", f"{best.J:.4g}", f"trial {best.number}"))
-    if pieces.estimate is not None:
+    if pieces.estimate is not None and pieces.estimate.low > 0:  # no sum of squares is below
         about = f"90 %: {pieces.estimate.low:.4g} to {pieces.estimate.high:.4g}"
         tiles.append(("best J without noise, estimated", f"{pieces.estimate.cost:.4g}", about))
     if score is not None:
         tiles.append(
             (f"RMSE after 5 s / {unit}", f"{factor * score.rmse:.3g}", "of the true outputs, in the best trial")
         )
+    limits = study.limits if study else ()
     failed = sum(trial.outcome == "failed" for trial in trials)
     cut = sum(trial.outcome == "cut" for trial in trials)
-    of = f"of {study.trials} asked for; " if study and study.trials != len(trials) else ""
-    tiles.append(("trials", str(len(trials)), f"{of}{failed} failed, {cut} cut short"))
+    told = f"{failed} failed, {cut} cut short"
+    if study and study.trials != len(trials):
+        told = (
+            f"of {study.trials}, {pieces.pending} of them out; {told}"
+            if pieces.pending
+            else f"of {study.trials}; {told}"
+        )
+    tiles.append(("trials", str(len(trials)), told))
     if seconds := sum(trial.plant_seconds or 0.0 for trial in trials):
         tiles.append(("the robot moved for", f"{seconds / 60:.3g} min", "in the search"))
     return {
@@ -108,7 +117,9 @@ def _told(pieces: Pieces) -> dict[str, Any]:
         "reach": _reach(pieces),
         "trials": [_trial(trial, pieces, factor) for trial in pieces.trials],
         "theta": _theta(pieces),
-        "verdicts": [_verdict(name, verdict, factor) for name, verdict in pieces.verdicts.items()],
+        "verdicts": [_verdict(name, verdict, factor, bool(limits)) for name, verdict in pieces.verdicts.items()],
+        "limits": [f"{limit.name} / {limit.unit}, limit {limit.limit:g}" for limit in limits],
+        "episodes": any(trial.plant_seconds for trial in trials),
         "unit": unit,
         "costs": pieces.costs,
         "settings": _settings(pieces),
@@ -140,23 +151,27 @@ def _theta(pieces: Pieces) -> list[dict[str, str]]:
     return rows
 
 
-def _trial(trial: Trial, pieces: Pieces, factor: float) -> tuple[str, ...]:
+def _trial(trial: Trial, pieces: Pieces, factor: float) -> tuple[str, str, list[str], str]:
     """A row of the table of all trials."""
-    J = "" if trial.J is None else f"{trial.J:.5g}"
-    rmse = f"{factor * trial.score.rmse:.3f}" if trial.score else ""
+    numbers = ["" if trial.J is None else f"{trial.J:.5g}"]
+    numbers.append(f"{factor * trial.score.rmse:.3f}" if trial.score else "")
+    for limit in pieces.study.limits if pieces.study else ():
+        value = (trial.measured or {}).get(limit.name)
+        numbers.append("" if value is None else f"{value:.4g}")
     told = {"failed": f"failed: {trial.failure}", "cut": f"cut: {trial.failure}"}.get(trial.outcome, "")
     if trial.outcome == "done" and not pieces.kept(trial):
         told = "broke a limit"
-    return str(trial.number), trial.phase, J, rmse, told
+    return str(trial.number), trial.phase, numbers, told
 
 
-def _verdict(name: str, verdict: Verdict, factor: float) -> tuple[str, list[str]]:
+def _verdict(name: str, verdict: Verdict, factor: float, limited: bool) -> tuple[str, list[str]]:
     flown = ["-", "-", "-"]
     if len(verdict.J):
         rmse = factor * verdict.rmse
         flown = [f"{np.median(verdict.J):.4g}", f"{np.median(rmse):.3f}", f"{rmse.max():.3f}"]
     error = f"{factor * verdict.prediction_error:.2f}" if np.isfinite(verdict.prediction_error) else "-"
-    return name, [str(len(verdict.J) + verdict.failed), *flown, str(verdict.failed), error]
+    broken = [str(verdict.broken)] if limited else []
+    return name, [str(len(verdict.J) + verdict.failed), *flown, str(verdict.failed), *broken, error]
 
 
 def _reach(pieces: Pieces) -> str:

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 from ...campaign import Episode, Journal, Result, Study, Trial, Verdict, assessed
 from ...campaign.store import journal_path, read_settings
 from ...feasibility import Check, check
-from ...plant import SimulatedPlant
+from ...plant import ExternalPlant, SimulatedPlant
 from ...tune import Estimate, Sensitivity
 
 T = TypeVar("T")
@@ -29,6 +29,7 @@ class Pieces:
     sensitivity: Sensitivity | None = None
     found: Check | None = None
     costs: list[list[str]] = field(default_factory=list)
+    pending: int = 0
     missing: list[str] = field(default_factory=list)
     _result: Result | None = None
 
@@ -64,14 +65,17 @@ class Pieces:
             self.verdicts = self._try("the flights under fresh noise", lambda: assessed(result), {})
             self.estimate = self._try("the estimate of the best", lambda: result.best_estimated, None)
             self.sensitivity = self._try("the sensitivity of theta", lambda: result.sensitivity, None)
-            if not self.verdicts:
+        if self.trials or journal_path(folder).is_file():
+            self.pending = self._try("the trials that are out", lambda: len(result.pending), 0)
+        if not isinstance(self.study.plant, ExternalPlant):  # of a robot flown elsewhere none of these is ever made
+            if self.best is not None and not self.verdicts:
                 self.missing.append("flights under fresh noise: the best theta was not flown again")
-        self.baseline = self._try("the Sobol baseline", lambda: _trials(folder / "sobol"), [])
+            self.baseline = self._try("the Sobol baseline", lambda: _trials(folder / "sobol"), [])
+            if self.rod_plant is None:
+                self.missing.append("the robot's shape: only simulated rods have one")
         made = self.study
         self.found = self._try("the check", lambda: check(made), None)
         self.costs = self._try("the exported controller", lambda: _costs(folder / "controller"), [])
-        if self.rod_plant is None:
-            self.missing.append("the robot's shape: only simulated rods have one")
 
     @property
     def rod_plant(self) -> SimulatedPlant | None:
@@ -83,7 +87,8 @@ class Pieces:
         try:
             return make()
         except Exception as error:  # whatever is wrong with a piece, the others are still worth a page
-            self.missing.append(f"{what}: {error}")
+            kind = "" if isinstance(error, (RuntimeError, ValueError, OSError)) else f"{type(error).__name__}: "
+            self.missing.append(f"{what}: {kind}{error}")
             return otherwise
 
 

@@ -3,11 +3,11 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const byId = (id) => document.getElementById(id);
   const BLUE = "#0072b2", ORANGE = "#d55e00", GREEN = "#009e73", GREY = "#7f7f7f", BLACK = "#1b1f24";
-  const COLOURS = [BLUE, ORANGE, GREEN, "#cc79a7", "#56b4e9", "#e69f00"];
+  const COLOURS = [BLUE, ORANGE, GREEN, "#aa4499", "#3a86b8", "#a66f00"];
   const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"];
   const SIDES = 14;           // of a section that is drawn
   const CURSOR_EVERY = 80;    // ms between two moves of the marks in the flat plots
-  const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
+  const config = { displaylogo: false, responsive: true, showSendToCloud: false, plotlyServerURL: "", showEditInChartStudio: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const font = { family: "system-ui, sans-serif", size: 13, color: BLACK };
   const axis = (title, more) => Object.assign(
     { title: { text: title }, zeroline: false, gridcolor: "#e4e7ec", linecolor: "#7a838f", ticks: "outside" }, more);
@@ -16,7 +16,8 @@
   function unpacked(packed) {
     if (!packed) return null;
     const bytes = Uint8Array.from(atob(packed.data), (sign) => sign.charCodeAt(0));
-    const whole = new Int16Array(bytes.buffer), values = Array.from(whole, (value) => value * packed.scale);
+    // The least of all stands for what was no finite number.
+    const values = Array.from(new Int16Array(bytes.buffer), (value) => value === -32768 ? NaN : value * packed.scale);
     const nest = (flat, shape) => {
       if (shape.length < 2) return flat;
       const size = flat.length / shape[0] || 0;
@@ -25,6 +26,8 @@
     return nest(values, packed.shape);
   }
   const column = (rows, i) => rows.map((row) => row[i]);
+  const most = (values, of = (value) => value) => values.reduce((top, value) => Math.max(top, of(value)), -Infinity);
+  const least = (values) => -most(values, (value) => -value);
   const mix = (a, b, share) => a.map((value, i) => value + share * (b[i] - value));
   const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
   const factor = data.unit.factor, unit = data.unit.output;
@@ -102,9 +105,9 @@
   const cable = (route, line, axes) =>
     route.map((at, i) => at && plus(plus(line[i], axes[i][0], at[0]), axes[i][1], at[1]));
 
-  // Blue for the least, grey in the middle, orange for the most.
+  // Blue and thin for the least, grey in the middle, orange and thick for the most.
   function tensionColour(share) {
-    const ends = share < 0.5 ? [[0, 114, 178], [185, 190, 198], 2 * share] : [[185, 190, 198], [213, 94, 0], 2 * share - 1];
+    const ends = share < 0.5 ? [[0, 84, 150], [107, 114, 128], 2 * share] : [[107, 114, 128], [213, 94, 0], 2 * share - 1];
     return `rgb(${mix(ends[0], ends[1], clamp(ends[2], 0, 1)).map(Math.round).join(",")})`;
   }
 
@@ -125,10 +128,9 @@
     const all = flight.shapes || [Array.from({ length: data.rod.half.length }, (_, i, of = data.rod.half.length) =>
       [data.rod.length * i / (of - 1), 0, 0])];
     const line = all[0], axes = frames(line);
-    const wide = Math.max(...data.rod.half.flat());
-    const reach = Math.max(...all.flat().map((p) => Math.max(Math.abs(p[1]), Math.abs(p[2])))) + wide;
+    const points = all.flat(), reach = most(points, (p) => Math.max(Math.abs(p[1]), Math.abs(p[2])) || 0) + most(data.rod.half.flat());
     const side = 1e3 * Math.max(reach, 0.2 * data.rod.length), tall = 1.05e3 * data.rod.length;
-    const lowest = Math.min(-25 * data.rod.length, ...all.flat().map((p) => 1e3 * p[0]));
+    const lowest = Math.min(-25 * data.rod.length, -1e3 * most(points, (p) => -p[0] || 0));
     const traces = [Object.assign({ type: "mesh3d", color: "#9fb4c4", opacity: 0.32, flatshading: false, hoverinfo: "skip",
       lighting: { ambient: 0.75, diffuse: 0.5, specular: 0.1 } }, shown(body(line, axes)), triangles(line.length))];
     cables = data.rod.cables.length;
@@ -168,7 +170,7 @@
     const held = flight.input[clamp(Math.floor(time / flight.dt + 1e-6), 0, flight.input.length - 1)];
     const looks = held.map((value, i) => {
       const [low, high] = inputRange(i), share = (value - low) / (high - low || 1);
-      return { colour: tensionColour(Math.round(20 * share) / 20), width: 4 + Math.round(8 * Math.abs(value) / (data.rod.scale[i] || 1)) };
+      return { colour: tensionColour(Math.round(20 * share) / 20), width: 3 + Math.round(9 * clamp(share, 0, 1)) };
     }).slice(0, cables);
     const key = JSON.stringify(looks);
     if (key !== painted[0]) {
@@ -214,14 +216,14 @@
       legend: { orientation: "h", y: 1.08, x: 0 },
       xaxis: axis(`y / ${unit}`), yaxis: axis(`z / ${unit}`, { scaleanchor: "x", scaleratio: 1 }) }, config);
   }
-  const spread = (rows) => Math.max(...rows[0].map((_, i) => Math.max(...column(rows, i)) - Math.min(...column(rows, i)))) > 0;
+  const spread = (rows) => rows[0].some((_, i) => most(column(rows, i)) > least(column(rows, i)));
 
   function drawOutputs(flight) {
     const count = flight.truth[0].length, traces = [], shapes = [], more = {};
     const at = times(flight, flight.truth.length);
     for (let i = 0; i < count; i++) {
       const row = { xaxis: "x", yaxis: `y${i ? i + 1 : ""}`, showlegend: i === 0 };
-      traces.push(Object.assign({ x: at, y: column(flight.output, i), mode: "lines", line: { color: "#9aa1ab", width: 1 }, name: "measured" }, row));
+      traces.push(Object.assign({ x: at, y: column(flight.output, i), mode: "lines", line: { color: "#6b7280", width: 1 }, name: "measured" }, row));
       if (reference) traces.push(Object.assign({ x: at, y: column(reference, i).slice(0, at.length), mode: "lines", line: { color: BLACK, dash: "dash", width: 1.5 }, name: "reference" }, row));
       traces.push(Object.assign({ x: at, y: column(flight.truth, i), mode: "lines", line: { color: BLUE, width: 2 }, name: "true" }, row));
       more[`yaxis${i ? i + 1 : ""}`] = axis(`${outputName(i, count)} / ${unit}`, { domain: [1 - (i + 1) / count + 0.03, 1 - i / count - 0.02] });
@@ -255,7 +257,7 @@
   function drawConvergence() {
     const trials = data.trials, costs = trials.filter((t) => t.J !== null).map((t) => t.J);
     if (!costs.length) { byId("convergence").parentNode.hidden = true; return; }
-    const least = Math.min(...costs), ceiling = least > 0 ? 30 * least : Math.max(...costs), seen = (t) => Math.min(t.J === null ? (t.atLeast === null ? ceiling : t.atLeast) : t.J, ceiling);
+    const lowest = least(costs), ceiling = lowest > 0 ? 30 * lowest : most(costs), seen = (t) => Math.min(t.J === null ? (t.atLeast === null ? ceiling : t.atLeast) : t.J, ceiling);
     const place = new Map(trials.map((t, i) => [t.n, i + 1]));
     const kinds = [
       ["seed point", (t) => t.kept && t.phase === "seed", "square-open", BLUE], ["search", (t) => t.kept && t.phase !== "seed", "circle", BLUE],
@@ -278,7 +280,7 @@
     }
     traces.push({ x: [], y: [], mode: "markers", marker: { symbol: "circle-open", size: 15, color: BLACK, line: { width: 2 } }, name: "shown above", hoverinfo: "skip" });
     Plotly.newPlot("convergence", traces, { font, margin: { l: 60, r: 12, t: 8, b: 44 }, hovermode: "closest", legend: { orientation: "h", y: 1.15, x: 0 },
-      xaxis: axis("trial, in the order of telling"), yaxis: axis("cost J", least > 0 ? { type: "log", tickvals: ticks(least, ceiling), ticktext: ticks(least, ceiling).map(String) } : {}) }, config);
+      xaxis: axis("trial, in the order of telling"), yaxis: axis("cost J", lowest > 0 ? { type: "log", tickvals: ticks(lowest, ceiling), ticktext: ticks(lowest, ceiling).map(String) } : {}) }, config);
     byId("convergence").on("plotly_click", (event) => { const n = event.points[0].customdata; if (n !== undefined && data.episodes[n]) show(n); });
     markShown = (n) => {
       const t = trials.find((trial) => trial.n === n);
@@ -295,12 +297,12 @@
 
   function drawSlices() {
     if (!data.slices.length) return;
-    const columns = Math.min(5, data.slices.length), rows = Math.ceil(data.slices.length / columns);
+    const columns = clamp(Math.floor(byId("slices").clientWidth / 205), 1, Math.min(5, data.slices.length)), rows = Math.ceil(data.slices.length / columns);
     byId("slices").style.height = `${70 + 225 * rows}px`;
     const layout = { font: Object.assign({}, font, { size: 12 }), showlegend: false, grid: { rows, columns, pattern: "independent", ygap: 0.38, xgap: 0.16 },
       margin: { l: 56, r: 10, t: 8, b: 62 }, shapes: [] };
-    const least = Math.min(...data.slices.flatMap((s) => s.middle)), positive = Math.min(...data.slices.flatMap((s) => s.low)) > 0;
-    const most = Math.max(...data.slices.flatMap((s) => s.middle));
+    const low = least(data.slices.flatMap((s) => s.middle)), high = most(data.slices.flatMap((s) => s.middle));
+    const positive = least(data.slices.flatMap((s) => s.low)) > 0;
     const traces = [];
     data.slices.forEach((slice, i) => {
       const n = i ? i + 1 : "", place = { xaxis: `x${n}`, yaxis: `y${n}`, hoverinfo: "skip" };
@@ -310,8 +312,10 @@
         { hoverinfo: "all", hovertemplate: `${slice.name} %{x:.4g} ${slice.unit === "1" ? "" : slice.unit}<br>J %{y:.4g}<extra></extra>` }));
       const told = slice.name + (slice.unit === "1" ? "" : ` / ${slice.unit}`);
       layout[`xaxis${n}`] = axis(told, Object.assign({ nticks: 4, title: { text: told, standoff: 4 } }, slice.log ? { type: "log", tickvals: ticks(slice.values[0], slice.values[slice.values.length - 1]), ticktext: ticks(slice.values[0], slice.values[slice.values.length - 1]).map(String), range: [Math.log10(slice.values[0]), Math.log10(slice.values[slice.values.length - 1])] } : {}));
-      const top = Math.min(most, positive ? 30 * least : most);
-      layout[`yaxis${n}`] = axis(i % columns ? "" : "J", positive ? { type: "log", range: [Math.log10(least / 1.4), Math.log10(Math.max(top, 1.5 * least))], tickvals: ticks(least / 1.4, top), ticktext: ticks(least / 1.4, top).map(String) } : { range: [least - 0.1 * (most - least), most] });
+      const top = positive ? Math.max(Math.min(high, 30 * low), 1.5 * low) : high;
+      layout[`yaxis${n}`] = axis(i % columns ? "" : "J", positive
+        ? { type: "log", range: [Math.log10(low / 1.4), Math.log10(top)], tickvals: ticks(low / 1.4, top), ticktext: ticks(low / 1.4, top).map(String) }
+        : { range: [low - 0.1 * (high - low), high] });
       layout.shapes.push({ type: "line", xref: `x${n}`, yref: `y${n} domain`, x0: slice.value, x1: slice.value, y0: 0, y1: 1, line: { color: ORANGE, width: 2, dash: "dash" } });
     });
     Plotly.newPlot("slices", traces, layout, Object.assign({}, config, { displayModeBar: false }));
@@ -347,7 +351,6 @@
   function play(on) {
     state.playing = on;
     control.play.textContent = on ? "Pause" : "Play";
-    control.play.setAttribute("aria-pressed", on);
     if (!on) { at(state.time); return; }
     if (state.time >= episode(state.trial).end) at(0);
     state.last = performance.now();
@@ -371,6 +374,7 @@
     return place >= 0 && place < order.length ? order[place] : null;
   }
 
+  window.addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((part) => { part.open = true; }));
   function begin() {
     drawConvergence();
     drawSlices();
