@@ -289,6 +289,7 @@ def test_a_start_that_does_not_fit_is_said(finished, tmp_path):
     assert "cannot be a start: its theta is frequency_y rad/s" in run.stderr
 
 
+@pytest.mark.slow
 def test_a_run_begun_by_python_goes_on_by_the_command_with_a_robot_of_ones_own(tmp_path):
     script = study(tmp_path, seed_points=3, iterations=0)
     own = "class Arm(SimulatedPlant): pass\nplant = Arm("

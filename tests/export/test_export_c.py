@@ -255,8 +255,17 @@ def test_whatever_comes_in_the_inputs_keep_their_bounds_and_nothing_is_spoilt(tm
 
 
 @with_compiler
-@pytest.mark.parametrize("real", ["double", "float"])
-@pytest.mark.parametrize("defined", [[], ["-DRATED"], ["-DDISTURBED"]], ids=["default", "rates", "told"])
+@pytest.mark.parametrize(
+    ("defined", "real"),
+    [
+        ([], "double"),
+        ([], "float"),
+        (["-DRATED"], "double"),
+        (["-DDISTURBED"], "float"),
+        pytest.param(["-DRATED"], "float", marks=pytest.mark.slow),
+        pytest.param(["-DDISTURBED"], "double", marks=pytest.mark.slow),
+    ],
+)
 def test_sanitizers_find_nothing_in_it(tmp_path, defined, real):
     mpc = {"-DRATED": BUSY, "-DDISTURBED": TOLD}.get(*defined, "") if defined else LinearMPC(Modal())
     export(record(mpc, samples=5), tmp_path, real=real, figures=False)

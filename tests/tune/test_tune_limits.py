@@ -65,6 +65,7 @@ def test_gardners_first_problem_is_solved():
     assert search.best.cost < grid_minimum(cost, measure, limit) + 0.05
 
 
+@pytest.mark.slow
 def test_gardners_second_problem_is_solved_though_few_points_keep_its_limit():
     cost, measure, limit = GARDNER_2
     search = Optimizer(GARDNER, seed=0, seed_points=8, limits={"load": limit})

@@ -41,6 +41,7 @@ def test_a_coordinate_without_room_stays_and_holds_up_no_other():
     assert abs(drawn[:, 1].std() - 1.0) < 0.05
 
 
+@pytest.mark.slow
 def test_what_eight_data_leave_open_is_wide_and_what_a_hundred_leave_is_not():
     spreads = []
     for n in (8, 120):
