@@ -112,6 +112,7 @@ def test_plot_animates_one_episode_and_only_with_a_suffix_that_it_knows(finished
     assert re.fullmatch(r"socasadi: the animation .*one\.webm ends in '\.webm'; take \.gif or \.mp4\n", refused.stderr)
 
 
+@pytest.mark.slow
 def test_a_robot_that_only_pulls_and_one_that_hangs_work_through_the_whole_line(tmp_path):
     script = study(tmp_path, rod="hanging", mpc="input_bounds=(0, 10)", task="Circle(radius=0.015, duration=1.0)")
     run = socasadi("run", script, cwd=tmp_path)

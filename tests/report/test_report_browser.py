@@ -42,13 +42,32 @@ def started():
     driver.quit()
 
 
-@pytest.fixture
-def browser(started, page):
-    """A browser with the page just opened."""
+RESET = """
+const by = (id) => document.getElementById(id);
+if (by("play").textContent === "Pause") by("play").click();
+window.scrollTo(0, 0);
+by("speed").value = "1";
+by("onward").checked = false;
+by("trial").value = JSON.parse(by("data").textContent).shown;
+by("trial").dispatchEvent(new Event("change"));
+document.querySelector("[data-turn=side]").click();
+"""
+
+
+@pytest.fixture(scope="module")
+def opened(started, page):
+    """A browser in which the page was opened."""
     started.get(page.as_uri())
     until(lambda: started.execute_script("return document.documentElement.dataset.ready") == "true")
-    yield started
-    severe = [line["message"] for line in started.get_log("browser") if line["level"] == "SEVERE"]
+    return started
+
+
+@pytest.fixture
+def browser(opened):
+    """The page as it was when it was opened."""
+    opened.execute_script(RESET)
+    yield opened
+    severe = [line["message"] for line in opened.get_log("browser") if line["level"] == "SEVERE"]
     assert severe == []
 
 
@@ -77,8 +96,9 @@ def tip(browser):
 
 
 def eye(browser):
-    camera = browser.execute_script("return document.getElementById('scene').layout.scene.camera.eye")
-    return [camera[name] for name in "xyz"]
+    """From where the rod is seen, as it is drawn."""
+    camera = "document.getElementById('scene')._fullLayout.scene._scene.getCamera().eye"
+    return browser.execute_script(f"const at = {camera}; return [at.x, at.y, at.z]")
 
 
 def test_it_opens_from_disk_with_every_plot_drawn(browser):

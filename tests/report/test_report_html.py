@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import sqlite3
+from functools import partial
 from html.parser import HTMLParser
 
 import numpy as np
@@ -13,7 +14,9 @@ from report_support import MODEL, small_run
 
 from socasadi import Circle, ExternalPlant, LinearMPC, Study
 from socasadi.campaign import Campaign
+from socasadi.feasibility import check
 from socasadi.report import html_report
+from socasadi.report.html import _data, _pieces
 
 
 @pytest.fixture(scope="module")
@@ -29,8 +32,9 @@ def page(result):
 
 
 @pytest.fixture
-def folder(result, tmp_path):
-    """A copy of the run to be damaged."""
+def folder(result, tmp_path, monkeypatch):
+    """A copy of the run to be damaged; what its check says at length is told of the whole one."""
+    monkeypatch.setattr(_pieces, "check", partial(check, quick=True))
     return shutil.copytree(result.folder, tmp_path / "run")
 
 
@@ -174,8 +178,6 @@ def test_the_page_of_a_robot_that_is_flown_elsewhere_has_no_rod(external, tmp_pa
 
 def test_a_long_run_keeps_its_page_small_and_its_best_trials(result):
     """Room for two or three episodes: the best comes first, and the page says which are there."""
-    from socasadi.report.html import _data, _pieces
-
     pieces = _pieces.Pieces.gather(result.folder)
     told = _data.page_data(pieces, room=15_000)
     assert 1 <= len(told["episodes"]) < 7
@@ -184,9 +186,7 @@ def test_a_long_run_keeps_its_page_small_and_its_best_trials(result):
 
 
 def test_what_is_no_finite_number_is_told_from_zero_and_spoils_no_other():
-    from socasadi.report.html._data import packed
-
     values = np.array([0.01, -0.02, np.inf, np.nan, 0.015, 1e6])
-    whole = np.frombuffer(base64.b64decode(packed(values)["data"]), dtype="<i2")
+    whole = np.frombuffer(base64.b64decode(_data.packed(values)["data"]), dtype="<i2")
     assert list(whole == -32768) == [False, False, True, True, False, False]
-    assert unpacked(packed(values))[[0, 1, 4]] == pytest.approx([0.01, -0.02, 0.015], rel=0.05)
+    assert unpacked(_data.packed(values))[[0, 1, 4]] == pytest.approx([0.01, -0.02, 0.015], rel=0.05)

@@ -125,6 +125,7 @@
 
   function drawScene(flight) {
     if (!data.rod || !webgl) return;
+    camera = viewed();
     const all = flight.shapes || [Array.from({ length: data.rod.half.length }, (_, i, of = data.rod.half.length) =>
       [data.rod.length * i / (of - 1), 0, 0])];
     const line = all[0], axes = frames(line);
@@ -152,7 +153,7 @@
     const ratio = Math.min(0.9 * (tall - lowest) / (2 * side), 1.6);
     Plotly.react("scene", traces, {
       showlegend: false, font, margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "camera",
-      scene: { camera, aspectmode: "manual", aspectratio: { x: 0.9, y: 0.9, z: ratio },
+      scene: { camera: structuredClone(camera), aspectmode: "manual", aspectratio: { x: 0.9, y: 0.9, z: ratio },
         xaxis: box("y / mm", sense([-side, side]), 3), yaxis: box("z / mm", [-side, side], 3), zaxis: box("x / mm", sense([lowest, tall]), 5) },
     }, Object.assign({}, config, { displayModeBar: false, scrollZoom: true }));
     painted = [];
@@ -184,11 +185,17 @@
     return limits ? [limits[0][i], limits[1][i]] : [-1, 1];
   }
 
+  // Plotly's own layout does not always hear of a drag; its scene does.
+  function viewed() {
+    const drawn = byId("scene")._fullLayout;
+    return drawn && drawn.scene._scene ? drawn.scene._scene.getCamera() : camera;
+  }
   function look(next) {
     camera = next;
-    Plotly.relayout("scene", { "scene.camera": camera });
+    Plotly.relayout("scene", { "scene.camera": structuredClone(camera) });  // which it changes
   }
   function turned(by, tilt, zoom) {
+    camera = viewed();
     const { x, y, z } = camera.eye, far = Math.hypot(x, y, z) * zoom;
     const around = Math.atan2(y, x) + by, high = clamp(Math.asin(z / Math.hypot(x, y, z)) + tilt, -1.5, 1.5);
     return { eye: { x: far * Math.cos(high) * Math.cos(around), y: far * Math.cos(high) * Math.sin(around), z: far * Math.sin(high) },
@@ -411,7 +418,6 @@
       if (turn) { event.preventDefault(); look(TURNS[turn]()); } else if (event.key === " ") { event.preventDefault(); play(!state.playing); }
     });
     show(order.includes(data.shown) ? data.shown : order[0]);
-    if (data.rod && webgl) byId("scene").on("plotly_relayout", (change) => { if (change["scene.camera"]) camera = change["scene.camera"]; });
     document.documentElement.dataset.ready = "true";
   }
   begin();
