@@ -33,7 +33,8 @@ def following(case: Case) -> list[Finding]:
     mpc, cost = case.study.mpc, case.study.cost
     findings.append(_weighed(case, cost, "cost weights"))
     own = Cost(Q=mpc.Q, R=mpc.R, input_term=mpc.input_term)
-    return findings if own == cost else [*findings, _weighed(case, own, "MPC weights")]
+    same = case.best_flight(own) is case.best_flight(cost)
+    return findings if same else [*findings, _weighed(case, own, "MPC weights")]
 
 
 def timing(case: Case) -> list[Finding]:
@@ -106,7 +107,8 @@ def _speed(case: Case) -> list[Finding]:
     says, advice = f"following the reference as fast as it moves takes {percent(share)} of the input bound", ""
     if mpc.rate_limits is not None:
         rates = np.diff(moving, axis=0) / mpc.sample_time
-        hasty = float(np.max(np.where(rates > 0, rates / mpc.rate_limits[1], rates / mpc.rate_limits[0])))
+        allowed = np.where(rates > 0, mpc.rate_limits[1], -mpc.rate_limits[0])
+        hasty = float(np.max(np.abs(rates) / np.maximum(allowed, 1e-12)))
         says += f" and {percent(hasty)} of the rate bound"
         if hasty > max(share, 1):
             share, advice = hasty, "a slower reference, or larger rate_bounds"

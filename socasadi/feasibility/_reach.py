@@ -1,6 +1,6 @@
 """Where a robot can be held at rest: the nearest pose to a wanted output, and how far it reaches in each direction."""
 
-from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -13,7 +13,7 @@ Bounds = tuple[np.ndarray, np.ndarray]
 
 _STEPS = 12
 _LEAST_NORM = 1e-4  # what a unit of input costs beside a miss as large as the robot's reach, both squared
-_CLIMBS = 4
+_CLIMBS, _HALVINGS = 4, 10
 
 
 def nearest(robot: Robot, wanted: np.ndarray, bounds: Bounds, start: Pose, calm: np.ndarray | None = None) -> Pose:
@@ -91,20 +91,9 @@ def ray(corners: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> float
 
 def _towards(robot: Robot, pose: Pose, given: np.ndarray) -> Pose:
     """The pose under ``given``, or as far on the way there as the robot comes to rest."""
-    share, attempt = 1.0, _resting(robot, pose)
-    while share > 1e-3:
-        if (found := attempt(pose.input + share * (given - pose.input))) is not None:
-            return found
-        share /= 2
+    for halvings in range(_HALVINGS):
+        with suppress(EquilibriumError):
+            found = robot.pose(pose.input + 0.5**halvings * (given - pose.input), pose)
+            if np.isfinite(found.output).all():
+                return found
     return pose
-
-
-def _resting(robot: Robot, near: Pose) -> Callable[[np.ndarray], Pose | None]:
-    def attempt(given: np.ndarray) -> Pose | None:
-        try:
-            found = robot.pose(given, near)
-        except EquilibriumError:
-            return None
-        return found if np.isfinite(found.output).all() else None
-
-    return attempt

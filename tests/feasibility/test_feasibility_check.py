@@ -182,3 +182,9 @@ def test_nothing_is_told_of_a_speed_that_the_jump_at_the_start_hides():
 def test_a_mode_that_does_not_swing_is_sampled_by_its_time_constant():
     honey = replace(PAPER, material=Material(young=1e6, poisson=0.5, density=1000.0, damping=2.2e5))
     assert verdicts(check(study(rod=honey, sample_time=2.0), quick=True))["sample time"] == "infeasible"
+
+
+def test_weights_may_be_matrices_and_those_of_the_mpc_are_told_only_where_they_differ():
+    matrices = Cost(Q=np.diag([1e3, 1e3]), R=np.eye(3))
+    assert "MPC weights" not in verdicts(check(study(cost=matrices, Q=np.diag([1e3, 1e3]), R=np.eye(3)), quick=True))
+    assert "MPC weights" in verdicts(check(study(cost=matrices, Q=np.diag([1e3, 2e3])), quick=True))
