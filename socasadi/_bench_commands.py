@@ -16,7 +16,6 @@ from ._terminal import (
     distance,
     opened,
     out,
-    outcome,
     print_theta,
     starting_from,
     table,
@@ -33,6 +32,7 @@ from .campaign import (
     load_study,
     read_recording,
     recognise,
+    told_outcome,
 )
 from .codegen import c_compiler
 from .export import ExportError
@@ -237,17 +237,22 @@ def _print_pending(result: Result, as_json: bool) -> None:
     if not out_now:
         out.print(f"{result.folder}: nothing is out; {_left(len(result.trials), 0, result.study)}")
         return
-    listed = table("trial", "phase", "asked (UTC)", "controller", left=("phase", "asked (UTC)", "controller"))
-    for asked in out_now:
-        where = str(bench.trial(asked.number)) if asked.by_hand else "flown by a run"
-        listed.add_row(str(asked.number), asked.phase, asked.started.split("+")[0].replace("T", " "), where)
-    out.print(listed)
+    rows = [
+        {
+            "trial": str(asked.number),
+            "phase": asked.phase,
+            "asked (UTC)": asked.started.split("+")[0].replace("T", " "),
+            "controller": str(bench.trial(asked.number)) if asked.by_hand else "flown by a run",
+        }
+        for asked in out_now
+    ]
+    out.print(table(rows, left=("phase", "asked (UTC)", "controller")))
 
 
 def _print_told(campaign: Campaign, told: Trial, before: Trial | None) -> None:
     study, score = campaign.study, told.score
     factor, unit = distance(study)
-    line = outcome(told)
+    line = told_outcome(told)
     if told.outcome == "cut":
         line += f"; {told.saved_seconds or 0:g} s were spared"
     if score is not None:
@@ -275,7 +280,7 @@ def _print_told(campaign: Campaign, told: Trial, before: Trial | None) -> None:
 
 def _print_taken_back(campaign: Campaign, trial: Trial) -> None:
     folder = _quoted(campaign.folder)
-    out.print(f"{f'trial {trial.number}':11} was told as {outcome(trial)}; that is taken back")
+    out.print(f"{f'trial {trial.number}':11} was told as {told_outcome(trial)}; that is taken back")
     out.print(f"run         {_left(len(campaign.trials), len(campaign.pending), campaign.study)}")
     following = f"socasadi tell {folder} --trial {trial.number} --csv recording.csv"
     out.print(f"next        {following if trial.by_hand else 'socasadi run STUDY --resume flies it again'}")

@@ -6,18 +6,21 @@ from typing import Annotated
 import typer
 
 from ._terminal import StudyFile, out, print_check
-from .campaign import load_study, read_probe
+from .campaign import Study, load_study, read_probe
 from .feasibility import Check, check, read_spec_sheet
+
+SpecSheet = Annotated[
+    Path | None, typer.Option("--spec", metavar="FILE", help="Data sheet (TOML) of a robot that is not simulated.")
+]
+RobotRecord = Annotated[
+    Path | None, typer.Option("--record", metavar="FILE", help="Short probing record (CSV) of the robot itself.")
+]
 
 
 def check_(
     script: StudyFile,
-    spec: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Data sheet (TOML) of a robot that is not simulated.")
-    ] = None,
-    record: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Short probing record (CSV) of the robot itself.")
-    ] = None,
+    spec: SpecSheet = None,
+    record: RobotRecord = None,
     figures: Annotated[
         Path | None,
         typer.Option("--figures", metavar="DIR", help="Folder for the picture; runs/NAME-check by default."),
@@ -25,9 +28,7 @@ def check_(
 ) -> None:
     """Say whether a study can work at all: reach, effort, timing, noise, model, arithmetic. Moves nothing."""
     study = load_study(script)
-    plant = None if spec is None else read_spec_sheet(spec, study.mpc.sample_time)
-    probed = None if record is None else read_probe(record, study)
-    found = check(study, plant=plant, record=probed)
+    found = checked(study, spec, record)
     out.print(f"{script}, by what is known from {found.source}:")
     print_check(found.findings)
     out.print(_summary(found))
@@ -38,6 +39,13 @@ def check_(
         out.print(f"picture: {save_figures({'reach': reach_figure(found.picture)}, folder)[0]}")
     if found.verdict == "infeasible":
         raise typer.Exit(1)
+
+
+def checked(study: Study, spec: Path | None, record: Path | None) -> Check:
+    """The check of a study, with the data sheet and the record of a robot that is not simulated."""
+    plant = None if spec is None else read_spec_sheet(spec, study.mpc.sample_time)
+    probed = None if record is None else read_probe(record, study)
+    return check(study, plant=plant, record=probed)
 
 
 def _summary(found: Check) -> str:

@@ -8,13 +8,25 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
-from .campaign import Asked, Result, RunError, Study, Trial, Units, Verdict, clock, load_study, read_probe
+from .campaign import (
+    Asked,
+    Result,
+    RunError,
+    Study,
+    Trial,
+    Units,
+    Verdict,
+    bound_notes,
+    clock,
+    load_study,
+    read_probe,
+    verdict_row,
+)
 from .campaign.store import compare_settings, journal_path, read_settings
 from .export import NotBuiltError, build_and_replay
 from .feasibility import Finding
@@ -61,11 +73,13 @@ def starting_from(study: Study, record: Path | None) -> Study:
     return replace(study, initial=(identify(study.mpc.model, read_probe(record, study)), *study.initial))
 
 
-def table(*headings: str, left: tuple[str, ...] = (), title: str = "") -> Table:
-    """A table without lines, its columns at the right but for those ``left``."""
+def table(rows: Sequence[Mapping[str, str]], left: tuple[str, ...] = (), title: str = "") -> Table:
+    """A table without lines of texts by their heading, its columns at the right but for those ``left``."""
     made = Table(box=None, header_style="bold", title=title or None, title_justify="left", title_style="")
-    for heading in headings:
+    for heading in rows[0] if rows else ():
         made.add_column(heading, justify="left" if heading in left else "right")
+    for row in rows:
+        made.add_row(*row.values())
     return made
 
 
@@ -77,9 +91,9 @@ def distance(study: Study) -> tuple[float, str]:
 def print_theta(study: Study, trial: Asked, title: str) -> None:
     """The entries of a theta by name, with their bounds."""
     listed = Table(box=None, show_header=False, title=title, title_justify="left", title_style="")
-    for entry, value in zip(study.mpc.model.entries, trial.theta, strict=True):
-        bounds = f"[{entry.lower:g}, {entry.upper:g}]"
-        listed.add_row(f"  {entry.name}", f"{value:.5g}", entry.unit, bounds)
+    entries = study.mpc.model.entries
+    for entry, value, note in zip(entries, trial.theta, bound_notes(entries, trial.theta), strict=True):
+        listed.add_row(f"  {entry.name}", f"{value:.5g}", entry.unit, f"[{entry.lower:g}, {entry.upper:g}]", note)
     out.print(listed)
 
 
@@ -125,17 +139,6 @@ def estimated(result: Result) -> str:
     return f"best without noise, as estimated: J = {estimate.cost:.4g} (90 %: {between}), trial {trial.number}"
 
 
-def outcome(trial: Trial) -> str:
-    """What came of a trial, in a few words."""
-    match trial.outcome:
-        case "failed":
-            return f"failed: {trial.failure}"
-        case "cut":
-            return f"cut: J is at least {trial.at_least:.5g}"
-        case "done":
-            return f"J = {trial.J:.5g}"
-
-
 def print_chosen(result: Result) -> None:
     """The theta whose controller is exported."""
     chosen = result.chosen
@@ -145,19 +148,8 @@ def print_chosen(result: Result) -> None:
 
 def print_verdicts(study: Study, verdicts: Mapping[str, Verdict]) -> None:
     """What each theta was worth when it was flown again."""
-    factor, unit = distance(study)
-    limited = ("broke a limit",) if study.limits else ()
-    headings = ("theta", "flights", "J (median)", f"RMSE / {unit} (median, worst)", "failed", *limited)
-    listed = table(*headings, f"open-loop error / {unit}", left=("theta",), title="\nflown under fresh noise:")
-    for name, verdict in verdicts.items():
-        flown = ("-", "-")
-        if len(verdict.J):
-            rmse = factor * verdict.rmse
-            flown = (f"{np.median(verdict.J):.4g}", f"{np.median(rmse):.3f}, {rmse.max():.3f}")
-        counts = (str(verdict.failed), str(verdict.broken)) if limited else (str(verdict.failed),)
-        flights = str(len(verdict.J) + verdict.failed)
-        listed.add_row(name, flights, *flown, *counts, f"{factor * verdict.prediction_error:.2f}")
-    out.print(listed)
+    rows = [{"theta": name} | verdict_row(verdict, study) for name, verdict in verdicts.items()]
+    out.print(table(rows, left=("theta",), title="\nflown under fresh noise:"))
 
 
 def spared(result: Result) -> str:

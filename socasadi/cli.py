@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from ._bench_commands import ask, init, tell
-from ._check_command import check_
+from ._check_command import RobotRecord, SpecSheet, check_, checked
 from ._run_command import run
 from ._sparkline import sparkline
 from ._terminal import (
@@ -18,11 +18,9 @@ from ._terminal import (
     StudyScript,
     best_of,
     counting,
-    distance,
     estimated,
     opened,
     out,
-    outcome,
     print_chosen,
     print_contents,
     print_verdicts,
@@ -32,12 +30,12 @@ from ._terminal import (
 )
 from .campaign import (
     JournalError,
-    Limit,
     Result,
     RunError,
-    Trial,
     assessed,
     emulate,
+    told_outcome,
+    trial_row,
     trials_csv,
 )
 from .codegen import CompilationError
@@ -74,25 +72,15 @@ def show(
         csv.write_text(trials_csv(result), encoding="utf-8")
         out.print(f"{csv}: {len(result.trials) + len(result.pending)} trials")
         return
-    study, (factor, unit) = result.study, distance(result.study)
-    headings = ("trial", "phase", "J", "literal J", f"RMSE / {unit}", *map(_heading, study.limits))
-    listed = table(*headings, "outcome", left=("phase", "outcome"))
-    best = best_of(result)
-    for trial in sorted([*result.trials, *result.pending], key=lambda trial: trial.number):
-        if not isinstance(trial, Trial):
-            listed.add_row(str(trial.number), trial.phase, *[""] * (3 + len(study.limits)), "not told yet")
-            continue
-        score = trial.score
-        numbers = ["" if trial.J is None else f"{trial.J:.5g}"]
-        numbers += [f"{score.literal:.5g}", f"{factor * score.rmse:.3f}"] if score else ["", ""]
-        numbers += [_measured(limit, trial) for limit in study.limits]
-        listed.add_row(str(trial.number), trial.phase, *numbers, _outcome(trial, best))
-    out.print(listed)
+    study, best = result.study, best_of(result)
+    asked = sorted([*result.trials, *result.pending], key=lambda trial: trial.number)
+    rows = [trial_row(trial, study, best=best is not None and trial.number == best.number) for trial in asked]
+    out.print(table(rows, left=("phase", "outcome")))
     if study.limits:
         most = ", ".join(f"{limit.name} {limit.limit:g} {limit.unit}".rstrip() for limit in study.limits)
         out.print(f"limits: {most}; ! is above its limit")
     for trial in result.taken_back:
-        out.print(f"taken back: trial {trial.number}, told as {outcome(trial)}")
+        out.print(f"taken back: trial {trial.number}, told as {told_outcome(trial)}")
     if lines := sparkline(result.trials, result.kept, out.width, out.encoding):
         out.print("", *lines, sep="\n")
     if told := estimated(result):
@@ -138,12 +126,17 @@ def report(
         Path | None, typer.Option("--out", metavar="FILE", help="Where to write; report.html in RUN by default.")
     ] = None,
     script: StudyScript = None,
+    spec: SpecSheet = None,
+    record: RobotRecord = None,
 ) -> None:
     """Write a run as one HTML file that opens from disk: all its figures, and the rod moving."""
     from .report import html_report
 
     with out.status("reporting"):
-        written = html_report(run_folder, file, None if script is None else opened(run_folder, script).study)
+        study = None if script is None else opened(run_folder, script).study
+        told = spec is not None or record is not None
+        found = checked(study or opened(run_folder, None).study, spec, record) if told else None
+        written = html_report(run_folder, file, study, found)
     out.print(f"{written}: {written.stat().st_size / 1e6:.1f} MB, for any browser")
 
 
@@ -205,23 +198,6 @@ def main() -> None:
     ) as error:
         print(f"socasadi: {error}", file=sys.stderr)
         sys.exit(1)
-
-
-def _heading(limit: Limit) -> str:
-    return f"{limit.name} / {limit.unit}" if limit.unit else limit.name
-
-
-def _measured(limit: Limit, trial: Trial) -> str:
-    value = (trial.measured or {}).get(limit.name)
-    if value is None:
-        return ""
-    return f"{value:.4g} {'!' if value > limit.limit else ' '}"
-
-
-def _outcome(trial: Trial, best: Trial | None) -> str:
-    if trial.outcome == "done":  # its J has a column
-        return "best" if best is not None and trial.number == best.number else ""
-    return outcome(trial)
 
 
 if __name__ == "__main__":

@@ -1,14 +1,27 @@
-"""All trials of a run as a table."""
+"""Trials and verdicts as tables: numbers for other programs, texts for people."""
+
+from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ..model import Entry
+from ..tune import Space
+from ._assess import Verdict
 from ._result import Result
-from .experiment import Units
-from .store import Trial
+from .experiment import Limit, Units
+from .store import Asked, Trial
+
+if TYPE_CHECKING:
+    from ._study import Study
+
+_ON_BOUND = 0.005
+"""Share of an entry's interval within which it is told to be on the bound."""
 
 
 def trials_csv(result: Result) -> str:
@@ -60,3 +73,77 @@ def _rows(result: Result) -> Iterator[dict[Any, Any]]:
 
 def _with_unit(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
+
+
+def trial_row(trial: Asked, study: Study | None = None, *, best: bool = False) -> dict[str, str]:
+    """A trial as it is told to people: texts by their heading, in order; empty where there is nothing.
+
+    Parameters
+    ----------
+    trial
+        Told, or asked only.
+    study
+        Where it is known: what the outputs are in, and what is limited. A value above its limit ends with "!".
+    best
+        Whether it is the best of its run.
+    """
+    told = trial if isinstance(trial, Trial) else None
+    score, (factor, unit) = told and told.score, _shown(study)
+    row = {
+        "trial": str(trial.number),
+        "phase": trial.phase,
+        "J": "" if told is None or told.J is None else f"{told.J:.5g}",
+        "literal J": f"{score.literal:.5g}" if score else "",
+        f"RMSE / {unit}": f"{factor * score.rmse:.3f}" if score else "",
+    }
+    measured, broken = (told and told.measured) or {}, False
+    for limit in study.limits if study else ():
+        value = measured.get(limit.name)
+        above = value is not None and value > limit.limit
+        row[_per_unit(limit)] = "" if value is None else f"{value:.4g} {'!' if above else ' '}"
+        broken = broken or above
+    outcome = "not told yet" if told is None else told_outcome(told) if told.outcome != "done" else ""
+    return row | {"outcome": outcome or ("best" if best else "broke a limit" if broken else "")}
+
+
+def told_outcome(trial: Trial) -> str:
+    """What came of a trial, in a few words."""
+    match trial.outcome:
+        case "failed":
+            return f"failed: {trial.failure}"
+        case "cut":
+            return f"cut: J is at least {trial.at_least:.5g}"
+        case "done":
+            return f"J = {trial.J:.5g}"
+
+
+def verdict_row(verdict: Verdict, study: Study) -> dict[str, str]:
+    """A verdict as it is told to people: texts by their heading, in order."""
+    factor, unit = _shown(study)
+    flown, rmse, error = len(verdict.J), factor * verdict.rmse, factor * verdict.prediction_error
+    return {
+        "flights": str(flown + verdict.failed),
+        "J, median": f"{np.median(verdict.J):.4g}" if flown else "-",
+        f"RMSE / {unit}, median": f"{np.median(rmse):.3f}" if flown else "-",
+        "worst": f"{rmse.max():.3f}" if flown else "-",
+        "failed": str(verdict.failed),
+        **({"broke a limit": str(verdict.broken)} if study.limits else {}),
+        f"open-loop error / {unit}": f"{error:.2f}" if np.isfinite(error) else "-",
+    }
+
+
+def bound_notes(entries: Sequence[Entry], theta: np.ndarray) -> list[str]:
+    """Which entries of a theta lie on a bound of theirs, so that a better one may lie beyond: a text each, or none."""
+    at = Space(entries).to_unit(theta)
+    return [
+        "on its lower bound" if x < _ON_BOUND else "on its upper bound" if x > 1 - _ON_BOUND else ""
+        for x in at.tolist()
+    ]
+
+
+def _shown(study: Study | None) -> tuple[float, str]:
+    return (Units.of(study.plant) if study else Units()).shown
+
+
+def _per_unit(limit: Limit) -> str:
+    return f"{limit.name} / {limit.unit}" if limit.unit else limit.name

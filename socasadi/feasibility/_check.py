@@ -10,6 +10,7 @@ from . import _arithmetic, _dynamics, _family, _statics
 from ._case import Case
 from ._finding import Check, Finding, Picture
 from ._known import known
+from ._units import units
 
 _ASKED = (
     _statics.gravity,
@@ -21,6 +22,7 @@ _ASKED = (
     _dynamics.following,
     _dynamics.timing,
     _dynamics.noise,
+    _dynamics.pulse,
 )
 
 
@@ -50,6 +52,8 @@ def check(
     if plant is None and isinstance(study.plant, SimulatedPlant):
         plant = study.plant
     _check_fit(study, plant, record)
+    if record is not None and (mistaken := units(study, record)):  # all else would be nonsense
+        return Check("the probing record", tuple(mistaken))
     robot, noise = known(study, plant, record)
     if robot is None:
         says = "the bounds of theta do not even tell which way the inputs move it, and nothing else is known"

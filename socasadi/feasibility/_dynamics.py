@@ -6,6 +6,7 @@ import numpy as np
 
 from ..campaign import Cost
 from ..mpc import weight_matrix
+from ..plant import PlantFailure, SimulatedPlant
 from ._case import Case, percent
 from ._finding import Finding
 
@@ -85,6 +86,31 @@ def noise(case: Case) -> list[Finding]:
     if spread > _SCATTER * (floor + best):
         return [Finding("noise", "doubtful", says, "a better sensor, or a longer or larger task")]
     return [Finding("noise", "ok", says)]
+
+
+def pulse(case: Case) -> list[Finding]:
+    """How far does the task's disturbance push the robot if nothing answers it?"""
+    given, robot = case.study.task.pulse, case.of_a_rod
+    if given is None or robot is None:
+        return []
+    mpc, frequency = case.study.mpc, case.robot.slowest(case.rest)[0]
+    plant = SimulatedPlant(robot.rod, mpc.sample_time, 0.0, robot.plant.output, robot.plant.substep)
+    # From where it rests: what it does elsewhere is alike, and nothing has to be held there.
+    still = plant.reset(tension_bounds=mpc.input_bounds)
+    says = f"a pulse of {np.linalg.norm(given.force):.3g} N for {given.duration:g} s"
+    try:
+        time = np.arange(0.0, given.duration + 1 / (frequency or 1.0), mpc.sample_time)
+        seen = [plant.step(plant.tension, given.at(given.time + t)) - still for t in time]
+    except PlantFailure as error:
+        return [Finding("pulse", "infeasible", f"{says} throws the arm: {error.reason}", "a weaker or shorter pulse")]
+    pushed = float(np.linalg.norm(seen, axis=1).max())
+    says += f" pushes the outputs by {case.length(pushed)} if nothing answers it"
+    limits = mpc.output_limits
+    room = np.inf if limits is None else min((case.reference - limits[0]).min(), (limits[1] - case.reference).min())
+    if pushed <= room:
+        return [Finding("pulse", "ok", says)]
+    says += f"; the reference keeps {case.length(max(room, 0.0))} away from the output bounds"
+    return [Finding("pulse", "doubtful", says, "a weaker pulse, or wider output_bounds: they are soft, and will break")]
 
 
 def _speed(case: Case) -> list[Finding]:

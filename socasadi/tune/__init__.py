@@ -16,7 +16,7 @@ Knows nothing of robots. GPy gives the marginal likelihood; prediction and acqui
 from ._optimizer import Optimizer
 from ._search import Estimate, Search, Timings, Trial
 from ._sensitivity import Sensitivity
-from ._sobol import SobolSearch
+from ._sobol import RandomSearch, SobolSearch
 from ._space import Parameter, ParameterLike, Space
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "Optimizer",
     "Parameter",
     "ParameterLike",
+    "RandomSearch",
     "Search",
     "Sensitivity",
     "SobolSearch",

@@ -1,4 +1,4 @@
-"""The scrambled Sobol sequence as a random-access list, and the search that knows nothing else."""
+"""Sequences of points as random-access lists, and the searches that know nothing else."""
 
 from __future__ import annotations
 
@@ -44,6 +44,13 @@ class SobolPoints:
         return self._kept[index]
 
 
+class RandomPoints(SobolPoints):
+    """Independent points, evenly distributed, in its place."""
+
+    def _draw(self, log2_count: int) -> NDArray:
+        return np.random.default_rng(self._seed).random((2**log2_count, self._space.dimension))
+
+
 class SobolSearch:
     """Space-filling points only: the baseline that an optimiser has to beat.
 
@@ -56,6 +63,8 @@ class SobolSearch:
         As of `Optimizer`.
     """
 
+    _sequence: type[SobolPoints] = SobolPoints
+
     def __init__(
         self,
         space: Space,
@@ -65,7 +74,7 @@ class SobolSearch:
         admissible: Callable[[NDArray], bool] | None = None,
     ) -> None:
         self._history = History(space, limits)
-        self._points = SobolPoints(space, check_seed(seed), admissible)
+        self._points = self._sequence(space, check_seed(seed), admissible)
 
     @property
     def space(self) -> Space:
@@ -108,3 +117,9 @@ class SobolSearch:
     ) -> None:
         """Record a trial; see `Optimizer.tell`."""
         self._history.append(self._history.check(theta, cost, failed, at_least, measured, deviation))
+
+
+class RandomSearch(SobolSearch):
+    """Independent points, evenly distributed: the baseline of the baseline. Its parameters are the same."""
+
+    _sequence = RandomPoints

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from feasibility_support import MODEL, study, verdicts
 
-from socasadi import Camera, Circle, Cost, LaserSpot, Modal, Origin, Rod, SimulatedPlant
+from socasadi import Camera, Circle, Cost, LaserSpot, Modal, Origin, Pulse, Rod, SimulatedPlant
 from socasadi.codegen import c_compiler
 from socasadi.feasibility import check
 from socasadi.rod import Cable, Chamber, Material, PointLoad, Section, Strain, cables_around
@@ -47,6 +47,12 @@ BROKEN = {
     "a model too stiff": (lambda: study(model=STIFF_MODEL), "model", "infeasible", "outside"),
     "cables on the other side": (lambda: study(model=TURNED), "model", "infeasible", "outside"),
     "two turns a second": (lambda: study(task=Circle(period=0.5)), "speed", "infeasible", ""),
+    "a push beyond the bounds": (
+        lambda: study(task=Circle(pulse=Pulse(time=10.0, duration=2.0, force=(0.0, 0.8, 0.0)))),
+        "pulse",
+        "doubtful",
+        "50 mm away",
+    ),
     "a start out of reach": (lambda: study(task=Origin(tip=(0.3, 0.0))), "start", "infeasible", "188 mm"),
 }
 if c_compiler():
@@ -164,6 +170,21 @@ def test_rates_that_are_too_slow_are_named():
     slow = check(study(rate_bounds=(-0.01, 0.01)), quick=True).objections[0]
     assert (slow.name, slow.verdict) == ("speed", "infeasible")
     assert "rate_bounds" in slow.advice
+
+
+def test_a_cable_that_may_never_be_let_go_is_named():
+    slack = check(study(rate_bounds=(0.0, 20.0)), quick=True).objections[0]
+    assert (slack.name, slack.verdict) == ("speed", "infeasible")
+
+
+def test_a_lasting_push_bends_the_arm_to_twice_where_it_would_hold_it():
+    """A step of force P swings a lightly damped cantilever to nearly twice its static deflection P L^3 / (3 E I)."""
+    pushed = study(task=Circle(radius=0.02, pulse=Pulse(time=5.0, duration=2.0, force=(0.0, 0.2, 0.0))))
+    (finding,) = [f for f in check(pushed, quick=True).findings if f.name == "pulse"]
+    static = 0.2 * 0.6**3 / (3 * 1e6 * np.pi * 0.03**4 / 4)
+    told = 1e-3 * float(finding.says.split(" mm")[0].split()[-1])
+    assert finding.verdict == "ok"
+    assert told == pytest.approx((1 + np.exp(-np.pi * 0.08)) * static, rel=0.05)
 
 
 def test_one_cable_reaches_along_a_line():

@@ -10,7 +10,7 @@ from socasadi.campaign import RecordingError, fly, probe, read_probe
 from socasadi.feasibility import SpecSheetError, check, read_spec_sheet
 from socasadi.feasibility._optimum import optimum
 from socasadi.feasibility._reach import ray
-from socasadi.model import StateSpace, identify
+from socasadi.model import Record, StateSpace, identify
 
 SHEET = """
 length = 0.6
@@ -81,6 +81,15 @@ def test_a_robot_is_known_from_its_probing_record():
     period = next(f for f in found.findings if f.name == "sample time").says
     assert float(period.split(" Hz")[0].split()[-1]) == pytest.approx(0.7365, rel=0.05)
     assert verdicts(check(arm(radius=0.2), record=record))["reach"] == "infeasible"
+
+
+@pytest.mark.parametrize(("part", "factor"), [("outputs", 1e3), ("outputs", 1e-3), ("inputs", 1e3), ("inputs", 1e-3)])
+def test_a_record_in_another_unit_is_told_as_that_and_as_nothing_else(part, factor):
+    record = probe(SimulatedPlant(Rod.preset("paper"), noise=1e-3), (-10, 10), seed=3, duration=5.0)
+    y, u = (factor if part == name else 1.0 for name in ("outputs", "inputs"))
+    (finding,) = check(arm(), record=Record(record.sample_time, u * record.tension, y * record.output)).findings
+    assert (finding.name, finding.verdict) == ("record", "infeasible")
+    assert f"whose {part} are in {'m' if part == 'outputs' else 'N'}" in finding.advice
 
 
 def test_a_record_is_read_from_csv(tmp_path):

@@ -16,7 +16,7 @@ from ._limits import (
 from ._probe import probe
 from ._recognise import recognise
 from ._recording import RecordingError, Units, read_probe, read_recording, resting_input, write_recording
-from ._task import Circle, Origin, Pulse, Task
+from ._task import Circle, FigureEight, Origin, Pulse, SetPoints, Task
 
 __all__ = [
     "Circle",
@@ -24,6 +24,7 @@ __all__ = [
     "Condition",
     "Cost",
     "Episode",
+    "FigureEight",
     "IterationBound",
     "Limit",
     "MeasuredLimit",
@@ -34,6 +35,7 @@ __all__ = [
     "Pulse",
     "RecordingError",
     "Score",
+    "SetPoints",
     "SettlingTime",
     "Task",
     "Units",

@@ -20,7 +20,8 @@ class Score:
     literal
         J as the paper writes it, with u in newtons.
     rmse
-        Root mean square over the samples after 5 s of the distance of the true outputs from the reference, m.
+        Root mean square over the samples after 5 s of the distance of the true outputs from the reference, m; of the
+        measured ones, with the sensor's noise in it, where the plant does not know the true ones.
     """
 
     J: float

@@ -128,6 +128,64 @@ class Circle(Task):
         return self.radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
+@dataclass(frozen=True, kw_only=True)
+class FigureEight(Task):
+    """The tip, at first at the origin, follows an eight that crosses itself there.
+
+    (y, z) = (width sin a, height sin 2a), a = 2 pi t / period (lemniscate of Gerono).
+
+    Parameters
+    ----------
+    width, height
+        How far it goes from the origin along +y and +z, m.
+    period
+        s for the whole eight.
+    """
+
+    width: float = 0.05
+    height: float = 0.025
+    period: float = 20.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("width", "height", "period"):
+            _positive(f"{name} of an eight", getattr(self, name))
+
+    def reference(self, time: np.ndarray) -> np.ndarray:
+        angle = 2 * np.pi * np.asarray(time) / self.period
+        return np.column_stack([self.width * np.sin(angle), self.height * np.sin(2 * angle)])
+
+
+@dataclass(frozen=True, kw_only=True)
+class SetPoints(Task):
+    """The outputs go to one point after another, and stay at the last.
+
+    Parameters
+    ----------
+    points
+        Wanted outputs, m, from the beginning on: (p,) each.
+    hold
+        s at each.
+    """
+
+    points: tuple[tuple[float, ...], ...]
+    hold: float = 5.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _positive("hold of set-points", self.hold)
+        if not (isinstance(self.points, Sequence) and self.points and isinstance(self.points[0], Sequence)):
+            raise ValueError(f"points of set-points are one or more tuples of outputs, not {self.points!r}")
+        for point in self.points:
+            _vector("a set-point", point, len(self.points[0]))
+        object.__setattr__(self, "points", tuple(tuple(map(float, point)) for point in self.points))
+
+    def reference(self, time: np.ndarray) -> np.ndarray:
+        # A point is wanted from the very instant on; the margin forgives the rounding of t = k * sample_time.
+        index = np.floor(np.asarray(time) / self.hold + 1e-9).astype(int)
+        return np.array(self.points)[np.clip(index, 0, len(self.points) - 1)]
+
+
 def _number(value: object) -> bool:
     return isinstance(value, Real) and math.isfinite(value)
 

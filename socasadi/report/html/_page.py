@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
-import numpy as np
 
-from ...campaign import Study, Trial, Units, Verdict
+from ...campaign import Study, Units, bound_notes, trial_row, verdict_row
 from ...campaign.store import journal_path
+from ...feasibility import Check
+from ...plant import ExternalPlant
 from .._reach import reach_figure
 from ._data import page_data
 from ._pieces import Pieces
@@ -21,7 +22,9 @@ _LARGEST = 7_800_000
 """Bytes of a page."""
 
 
-def html_report(folder: str | Path, file: str | Path | None = None, study: Study | None = None) -> Path:
+def html_report(
+    folder: str | Path, file: str | Path | None = None, study: Study | None = None, found: Check | None = None
+) -> Path:
     """Write a run as one HTML file that needs nothing beside it, and no network; less than 8 MB.
 
     A piece of the run that is missing or damaged is named in the page, and the others are shown.
@@ -34,6 +37,8 @@ def html_report(folder: str | Path, file: str | Path | None = None, study: Study
         Where to write; ``report.html`` in the folder by default.
     study
         The study, where a part of it is of the user's own making, so that the folder cannot make it.
+    found
+        What was checked with more than the study knows of its robot; None: what is found by the study alone.
 
     Returns
     -------
@@ -52,7 +57,7 @@ def html_report(folder: str | Path, file: str | Path | None = None, study: Study
     folder = Path(folder)
     if not folder.is_dir():
         raise FileNotFoundError(f"there is no run folder {folder}")
-    pieces = Pieces.gather(folder, study)
+    pieces = Pieces.gather(folder, study, found)
     if pieces.study is None and not pieces.trials:
         raise ValueError(f"{folder} holds no run that could be reported: {'; '.join(pieces.missing)}")
     own = files(__name__.rpartition(".")[0])
@@ -93,10 +98,10 @@ def _told(pieces: Pieces) -> dict[str, Any]:
         about = f"90 %: {pieces.estimate.low:.4g} to {pieces.estimate.high:.4g}"
         tiles.append(("best J without noise, estimated", f"{pieces.estimate.cost:.4g}", about))
     if score is not None:
-        tiles.append(
-            (f"RMSE after 5 s / {unit}", f"{factor * score.rmse:.3g}", "of the true outputs, in the best trial")
-        )
-    limits = study.limits if study else ()
+        # Of a recording nothing but the measurements is known.
+        outputs = "measured" if study and isinstance(study.plant, ExternalPlant) else "true"
+        about = f"of the {outputs} outputs, in the best trial"
+        tiles.append((f"RMSE after 5 s / {unit}", f"{factor * score.rmse:.3g}", about))
     failed = sum(trial.outcome == "failed" for trial in trials)
     cut = sum(trial.outcome == "cut" for trial in trials)
     told = f"{failed} failed, {cut} cut short"
@@ -115,10 +120,12 @@ def _told(pieces: Pieces) -> dict[str, Any]:
         "findings": pieces.found.findings if pieces.found else (),
         "source": pieces.found.source if pieces.found else "",
         "reach": _reach(pieces),
-        "trials": [_trial(trial, pieces, factor) for trial in pieces.trials],
+        "trials": [trial_row(trial, study, best=trial is best) for trial in pieces.trials],
         "theta": _theta(pieces),
-        "verdicts": [_verdict(name, verdict, factor, bool(limits)) for name, verdict in pieces.verdicts.items()],
-        "limits": [f"{limit.name} / {limit.unit}, limit {limit.limit:g}" for limit in limits],
+        "verdicts": [{"theta": name} | verdict_row(verdict, study) for name, verdict in pieces.verdicts.items()]
+        if study
+        else [],
+        "limits": [f"{limit.name} {limit.limit:g} {limit.unit}".rstrip() for limit in study.limits] if study else [],
         "episodes": any(trial.plant_seconds for trial in trials),
         "unit": unit,
         "costs": pieces.costs,
@@ -134,14 +141,15 @@ def _theta(pieces: Pieces) -> list[dict[str, str]]:
     if pieces.study is None or pieces.chosen is None:
         return []
     identified = pieces.verdicts.get("identified")
-    found, rows = pieces.sensitivity, []
-    for i, entry in enumerate(pieces.study.mpc.model.entries):
+    found, rows, entries = pieces.sensitivity, [], pieces.study.mpc.model.entries
+    notes = bound_notes(entries, pieces.chosen.theta)
+    for i, entry in enumerate(entries):
         rows.append(
             {
                 "name": entry.name,
                 "unit": "" if entry.unit == "1" else entry.unit,
                 "value": f"{pieces.chosen.theta[i]:.4g}",
-                "bounds": f"{entry.lower:.4g} to {entry.upper:.4g}",
+                "bounds": f"{entry.lower:.4g} to {entry.upper:.4g}" + (f", {notes[i]}" if notes[i] else ""),
                 "identified": f"{identified.theta[i]:.4g}" if identified else "",
                 "likely": f"{found.likely[i, 0]:.3g} to {found.likely[i, 1]:.3g}" if found else "",
                 "relevance": f"{100 * found.relevance[i]:.0f} %" if found else "",
@@ -149,29 +157,6 @@ def _theta(pieces: Pieces) -> list[dict[str, str]]:
             }
         )
     return rows
-
-
-def _trial(trial: Trial, pieces: Pieces, factor: float) -> tuple[str, str, list[str], str]:
-    """A row of the table of all trials."""
-    numbers = ["" if trial.J is None else f"{trial.J:.5g}"]
-    numbers.append(f"{factor * trial.score.rmse:.3f}" if trial.score else "")
-    for limit in pieces.study.limits if pieces.study else ():
-        value = (trial.measured or {}).get(limit.name)
-        numbers.append("" if value is None else f"{value:.4g}")
-    told = {"failed": f"failed: {trial.failure}", "cut": f"cut: {trial.failure}"}.get(trial.outcome, "")
-    if trial.outcome == "done" and not pieces.kept(trial):
-        told = "broke a limit"
-    return str(trial.number), trial.phase, numbers, told
-
-
-def _verdict(name: str, verdict: Verdict, factor: float, limited: bool) -> tuple[str, list[str]]:
-    flown = ["-", "-", "-"]
-    if len(verdict.J):
-        rmse = factor * verdict.rmse
-        flown = [f"{np.median(verdict.J):.4g}", f"{np.median(rmse):.3f}", f"{rmse.max():.3f}"]
-    error = f"{factor * verdict.prediction_error:.2f}" if np.isfinite(verdict.prediction_error) else "-"
-    broken = [str(verdict.broken)] if limited else []
-    return name, [str(len(verdict.J) + verdict.failed), *flown, str(verdict.failed), *broken, error]
 
 
 def _reach(pieces: Pieces) -> str:

@@ -34,9 +34,9 @@ class Pieces:
     _result: Result | None = None
 
     @classmethod
-    def gather(cls, folder: Path, study: Study | None = None) -> "Pieces":
+    def gather(cls, folder: Path, study: Study | None = None, found: Check | None = None) -> "Pieces":
         """Everything that can be read in ``folder``; ``study`` stands in for one that its settings cannot make."""
-        pieces = cls(folder)
+        pieces = cls(folder, found=found)
         pieces._read(study)
         return pieces
 
@@ -74,7 +74,7 @@ class Pieces:
             if self.rod_plant is None:
                 self.missing.append("the robot's shape: only simulated rods have one")
         made = self.study
-        self.found = self._try("the check", lambda: check(made), None)
+        self.found = self.found or self._try("the check", lambda: check(made), None)
         self.costs = self._try("the exported controller", lambda: _costs(folder / "controller"), [])
 
     @property

@@ -1,0 +1,40 @@
+"""Other ways to get a controller, each lent the same robot for the same time, and the comparison of them all.
+
+A method is a :class:`Method`: it spends the time of a :class:`Lab` and offers controllers. What it may know and what an
+experiment costs is the same for all: see there.
+"""
+
+from ._deepc import DeePC
+from ._fixed import Identified, Linearised
+from ._koopman import Koopman
+from ._lab import BudgetSpent, Lab
+from ._law import Forecast, Law, Program, looked_ahead
+from ._learning import IterativeLearning
+from ._method import Information, Method, identified, static_gain, tuned
+from ._nonlinear import NonlinearMPC
+from ._pid import PID
+from ._search import ModelSearch
+from ._weights import Weights
+
+__all__ = [
+    "PID",
+    "BudgetSpent",
+    "DeePC",
+    "Forecast",
+    "Identified",
+    "Information",
+    "IterativeLearning",
+    "Koopman",
+    "Lab",
+    "Law",
+    "Linearised",
+    "Method",
+    "ModelSearch",
+    "NonlinearMPC",
+    "Program",
+    "Weights",
+    "identified",
+    "looked_ahead",
+    "static_gain",
+    "tuned",
+]

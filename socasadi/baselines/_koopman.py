@@ -1,0 +1,107 @@
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+
+import numpy as np
+
+from ..campaign import Pilot
+from ..model import Entry, Record
+from ..mpc import LinearMPC
+from ._lab import Lab
+from ._law import Forecast, Law, Program, looked_ahead
+from ._method import Method, tuned
+
+
+@dataclass(frozen=True)
+class Koopman(Method):
+    """MPC on a linear model of lifted outputs, fitted by extended dynamic mode decomposition (EDMD).
+
+    Bruder, Gillespie, Remy, Vasudevan, "Modeling and control of soft robots using the Koopman operator and model
+    predictive control", RSS 2019 (arXiv 1902.02827); Bruder et al., IEEE Trans. Robotics 37, 2020. The lifting holds
+    outputs and inputs of the last samples, and monomials of the outputs among them; the lifted state comes from
+    measurements at every sample. Beyond the papers a constant disturbance of the outputs is estimated, lest there is a
+    steady error. The ridge of the fit and the gain of that estimate are tuned by flights.
+
+    Parameters
+    ----------
+    probing
+        s of probing.
+    delays
+        Samples before the present one that are lifted.
+    degree
+        Of the monomials, at most.
+    horizon
+        Samples that are looked ahead.
+    """
+
+    probing: float = 40.0
+    delays: int = 2
+    degree: int = 3
+    horizon: int = 20
+
+    def offers(self, lab: Lab) -> Iterator[Pilot]:
+        mpc, record = lab.study.mpc, lab.probe(self.probing)
+        knobs = (Entry("ridge", "1", 1e-6, 1e1, "log"), Entry("gain of the disturbance", "1", 0.01, 1.0, "log"))
+        return tuned(lab, knobs, lambda values: _Controller(self, mpc, record, *values), initial=[(1e-3, 0.2)])
+
+
+class _Controller(Law):
+    def __init__(self, method: Koopman, mpc: LinearMPC, record: Record, ridge: float, gain: float) -> None:
+        super().__init__(mpc)
+        self._method, self._gain, p, m, N = method, gain, mpc.outputs, mpc.inputs, method.horizon
+        self._unit = float(np.abs(record.output).max())  # so that monomials are of the size of what they are made of
+        u, y, d = record.tension / mpc.input_scale, record.output, method.delays
+        lifted = np.array([self._lift(y[t - d : t + 1][::-1], u[t - d : t][::-1]) for t in range(d, len(u) + 1)])
+        known = np.hstack([lifted[:-1], u[d:]])
+        size = lifted.shape[1]
+        fitted = np.linalg.solve(known.T @ known + ridge * len(known) * np.eye(known.shape[1]), known.T @ lifted[1:]).T
+        self._A, self._B = fitted[:, :size], fitted[:, size:]
+        # Outputs over the horizon: from the lifted state, from each input, and the disturbance.
+        C = self._unit * np.eye(size)[:p]
+        powers = [C]
+        for _ in range(N):
+            powers.append(powers[-1] @ self._A)
+        total = size + p + N * p + m
+        by_state = np.vstack(powers[1:])
+        by_input = np.zeros((N * p, N * m))
+        for k in range(N):
+            for j in range(k + 1):
+                by_input[k * p : (k + 1) * p, j * m : (j + 1) * m] = powers[k - j] @ self._B
+        known_part = np.hstack([by_state, np.tile(np.eye(p), (N, 1)), np.zeros((N * p, N * p + m))])
+        reference = np.eye(total)[size + p : size + p + N * p]
+        inputs = (np.eye(N * m), np.zeros((N * m, total)))
+        self._program = Program(mpc, Forecast(inputs, (by_input, known_part), reference, np.eye(total)[-m:]))
+        self.begin()
+
+    def begin(self) -> None:
+        self._program.forget()
+        self._u = np.tile(self.held / self.mpc.input_scale, (self._method.delays, 1))
+        self._y: np.ndarray | None = None
+        self._disturbance, self._expected = np.zeros(self.mpc.outputs), None
+
+    def act(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
+        before = self.held / self.mpc.input_scale
+        if self._y is None or self._expected is None:  # it was at rest so far
+            self._y = np.tile(y, (self._method.delays + 1, 1))
+        else:
+            self._y = np.vstack([y, self._y[:-1]])
+            self._u = np.vstack([before, self._u[:-1]])
+            self._disturbance = self._disturbance + self._gain * (y - self._expected - self._disturbance)
+        lifted = self._lift(self._y, self._u)
+        ahead = looked_ahead(reference, self._method.horizon)
+        parameters = np.concatenate([lifted, self._disturbance, ahead, before], axis=None)
+        wanted = self._program.inputs(parameters, self.info)[0]
+        lower, upper = self.mpc.input_limits
+        share = np.clip(np.nan_to_num(wanted, nan=0.0), lower, upper) / self.mpc.input_scale
+        self._expected = self._unit * (self._A @ lifted + self._B @ share)[: len(y)]
+        return wanted
+
+    def _lift(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Newest first: outputs (delays + 1, p), m, and inputs (delays, m), as shares -> the lifted state."""
+        y = y.ravel() / self._unit
+        monomials = [
+            np.prod(y[list(chosen)])
+            for degree in range(2, self._method.degree + 1)
+            for chosen in combinations_with_replacement(range(min(len(y), 4)), degree)
+        ]
+        return np.concatenate([y, u.ravel(), monomials, [1.0]])

@@ -1,0 +1,94 @@
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..campaign import Episode, Pilot, Study, fly_once, probe
+from ..model import Record
+
+_TRIAL, _PROBE = 0, 2
+"""Streams of random numbers: those of a campaign's trials and probing records."""
+_ROUNDING = 1e-9
+
+
+class BudgetSpent(Exception):
+    """The next experiment would take more of the robot's time than there is."""
+
+
+class Lab:
+    """A robot with a task, lent for so many seconds of its time: what all methods are given alike.
+
+    Experiments are those of a campaign of the same study: the same cost, the same limits, the same noise in the
+    experiment of the same number.
+
+    Parameters
+    ----------
+    study
+        Robot, task, cost, and the MPC's bounds and sample time.
+    checkpoints
+        s of the robot's time at which a method is asked for its controller, ascending; the last is all there is.
+
+    Attributes
+    ----------
+    spent
+        s of the robot's time so far.
+    flights, probes, failed
+        Experiments so far: of controllers, without one, and those of the former that failed.
+    """
+
+    def __init__(self, study: Study, checkpoints: Sequence[float]) -> None:
+        self.study, self.checkpoints = study, tuple(checkpoints)
+        self.spent = 0.0
+        self.flights = self.probes = self.failed = 0
+
+    @property
+    def due(self) -> bool:
+        """Whether one more flight may pass a checkpoint: whoever has a controller to offer should do so now."""
+        return any(self.spent <= at + _ROUNDING < self.spent + self.study.task.duration for at in self.checkpoints)
+
+    def probe(self, duration: float = 20.0) -> Record:
+        """A probing record of so many s: random steps of all tensions, half of the way to their bounds at most.
+
+        Raises
+        ------
+        BudgetSpent
+            There is not so much time left.
+        """
+        self._check(duration)
+        self.probes += 1
+        seed = int(np.random.SeedSequence([self.study.seed, _PROBE, self.probes]).generate_state(1)[0])
+        record = probe(self.study.plant, self.study.mpc.input_bounds, duration=duration, seed=seed)
+        self.spent += duration
+        return record
+
+    def fly(self, pilot: Pilot, *, give_up: float | None = None, number: int | None = None) -> Episode:
+        """One experiment with a controller.
+
+        Parameters
+        ----------
+        give_up
+            Value of J from which on it is cut; the seconds that it saves are not counted.
+        number
+            Of the experiment, which decides on its noise; by default how many there were, plus one.
+
+        Raises
+        ------
+        BudgetSpent
+            There is not time for a whole one.
+        """
+        self._check(self.study.task.duration)
+        self.flights += 1
+        episode = fly_once(self.study, pilot, stream=(_TRIAL, number or self.flights), give_up=give_up)
+        self.spent += len(episode.tension) * episode.sample_time
+        self.failed += episode.failure is not None
+        return episode
+
+    def cost(self, episode: Episode) -> float | None:
+        """J of a flight; None when it failed or was cut."""
+        if episode.failure is not None or episode.cut is not None:
+            return None
+        J = self.study.cost.score(episode, self.study.mpc.input_scale).J
+        return J if np.isfinite(J) else None
+
+    def _check(self, duration: float) -> None:
+        if self.spent + duration > self.checkpoints[-1] + _ROUNDING:
+            raise BudgetSpent(f"{self.spent:g} s of {self.checkpoints[-1]:g} s are spent; {duration:g} s are needed")

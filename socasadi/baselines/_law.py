@@ -1,0 +1,139 @@
+"""Controllers that are no LinearMPC, flown in its place: with its sample time, bounds and preview."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..mpc import KKT_TOLERANCE, ActiveSet, ControllerInfo, LinearMPC, weight_matrix
+from ..mpc.formulation import dual_program
+
+
+class Law(ABC):
+    """A feedback law whose inputs keep the bounds and the rate bounds of an MPC.
+
+    Attributes
+    ----------
+    mpc
+        Says what the inputs may be, how often they change, and how much of the reference is seen ahead.
+    info
+        What was done since the last reset: ``info.held`` counts the samples in which the law gave no finite input, and
+        the last one was held.
+    held
+        (m,) N, the last input.
+    """
+
+    def __init__(self, mpc: LinearMPC) -> None:
+        self.mpc, self.info, self.held = mpc, ControllerInfo(), np.zeros(mpc.inputs)
+
+    def reset(self, u_prev: ArrayLike = 0.0) -> None:
+        """Forget everything: the robot rests under ``u_prev``, N."""
+        self.info = ControllerInfo()
+        self.held = np.broadcast_to(np.asarray(u_prev, dtype=float), (self.mpc.inputs,)).copy()
+        self.begin()
+
+    def step(self, y: ArrayLike, reference: ArrayLike, disturbance: ArrayLike | None = None) -> np.ndarray:
+        """Inputs (m,), N, for the coming sample; y (p,) and reference (P, p) as of :class:`Controller`."""
+        wanted = self.act(np.asarray(y, dtype=float), np.atleast_2d(np.asarray(reference, dtype=float)))
+        self.info.steps += 1
+        if not np.isfinite(wanted).all():
+            self.info.held += 1
+            wanted = self.held
+        if self.mpc.rate_limits is not None:
+            slowest, fastest = (limit * self.mpc.sample_time for limit in self.mpc.rate_limits)
+            wanted = np.clip(wanted, self.held + slowest, self.held + fastest)
+        self.held = np.clip(wanted, *self.mpc.input_limits)
+        return self.held.copy()
+
+    @abstractmethod
+    def begin(self) -> None:
+        """Start anew, at rest under ``held``."""
+
+    @abstractmethod
+    def act(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
+        """The input (m,), N, that is wanted now; what is not finite is not applied."""
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """What the coming N samples hold, affine in what is decided, z (n,), and in what is known now, p (k,).
+
+    Attributes
+    ----------
+    input
+        Au (N m, n) and Bu (N m, k): inputs as shares of u_max, sample after sample, are Au z + Bu p.
+    output
+        Ay (N p, n) and By (N p, k): outputs, m, are Ay z + By p.
+    reference
+        (N p, k): what is wanted of them, m, as a map of p.
+    before
+        (m, k): the last input, as shares of u_max.
+    own
+        H (n, n) and g (n, k): z'Hz/2 + (g p)'z is added to the cost; None for nothing.
+    """
+
+    input: tuple[np.ndarray, np.ndarray]
+    output: tuple[np.ndarray, np.ndarray]
+    reference: np.ndarray
+    before: np.ndarray
+    own: tuple[np.ndarray, np.ndarray] | None = None
+
+
+class Program:
+    r"""The program of a predictive controller that has no linear model of its own, or another one:
+
+    .. math:: \min_z\; \sum_{k=1}^{N} |y_k - r_k|_Q^2 + \rho_R(u) + \lambda |s|^2 + z'Hz/2 + (g p)'z
+
+    within the bounds of an MPC, whose weights these are; bounds of outputs are soft. It is solved by the project's own
+    solver in C.
+    """
+
+    def __init__(self, mpc: LinearMPC, forecast: Forecast) -> None:
+        (Au, Bu), (Ay, By), m = forecast.input, forecast.output, mpc.inputs
+        horizon = len(Au) // m
+        R, Q = weight_matrix(mpc.R, m, "R"), weight_matrix(mpc.Q, mpc.outputs, "Q")
+        weighed, offset = np.eye(len(Au)), np.zeros((len(Au), len(forecast.before[0])))
+        if mpc.input_term == "rate":
+            weighed = weighed - np.eye(len(Au), k=-m)
+            offset[:m] = -forecast.before
+        elif mpc.input_term == "literal":
+            R = R * np.outer(mpc.input_scale, mpc.input_scale)
+        Q, R = np.kron(np.eye(horizon), Q), np.kron(np.eye(horizon), R)
+        moved, known = weighed @ Au, weighed @ Bu + offset
+        hessian = 2 * (Ay.T @ Q @ Ay + moved.T @ R @ moved)
+        gradient = 2 * (Ay.T @ Q @ (By - forecast.reference) + moved.T @ R @ known)
+        if forecast.own is not None:
+            hessian, gradient = hessian + forecast.own[0], gradient + forecast.own[1]
+        rows, free = [Au], [Bu]
+        lower, upper = ([np.tile(side / mpc.input_scale, horizon)] for side in mpc.input_limits)
+        quadratic = [np.full(len(Au), np.inf)]
+        if mpc.output_limits is not None:
+            unit = mpc.largest_output_bound
+            rows.append(Ay / unit)
+            free.append(By / unit)
+            lower.append(np.tile(mpc.output_limits[0] / unit, horizon))
+            upper.append(np.tile(mpc.output_limits[1] / unit, horizon))
+            slack = np.broadcast_to(np.asarray(mpc.slack_weight, dtype=float), mpc.outputs)
+            quadratic.append(np.tile(2 * slack * unit**2, horizon))
+        bounds = (np.concatenate(part) for part in (lower, upper, quadratic))
+        a, b = np.vstack(rows), np.vstack(free)
+        self._scale, self._shape = mpc.input_scale, (horizon, m)
+        self._solver = ActiveSet(dual_program(hessian, gradient, a, b, *bounds, np.zeros(len(a))))
+
+    def forget(self) -> None:
+        """Start the next solution from nothing."""
+        self._solver.forget()
+
+    def inputs(self, parameters: np.ndarray, info: ControllerInfo) -> np.ndarray:
+        """The coming inputs (N, m), N; NaN where the solver has no answer. ``info`` is told of the solver."""
+        answer = self._solver.solve(parameters)
+        info.iterations, info.residual = answer.iterations, answer.residual
+        if not answer.residual <= KKT_TOLERANCE:
+            return np.full(self._shape, np.nan)
+        return answer.values[: self._shape[0] * self._shape[1]].reshape(self._shape) * self._scale
+
+
+def looked_ahead(reference: np.ndarray, rows: int) -> np.ndarray:
+    """So many rows of the reference (rows, p), the last one held."""
+    return reference[np.minimum(np.arange(rows), len(reference) - 1)]

@@ -1,0 +1,135 @@
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+
+from ..campaign import Pilot
+from ..codegen import Buffered, compiled
+from ..mpc import LinearMPC
+from ..plant import SimulatedPlant
+from ..rod import Strain
+from ._lab import Lab
+from ._law import Forecast, Law, Program, looked_ahead
+from ._method import Information, Method
+
+
+@dataclass(frozen=True)
+class NonlinearMPC(Method):
+    """MPC on a rod: what can be reached with a model of the robot, in real time or not.
+
+    Gauss-Newton sequential quadratic programming (Diehl, Bock, Schlöder, "A real-time iteration scheme for nonlinear
+    optimization in optimal feedback control", SIAM J. Control and Optimization 43, 2005), each program started from the
+    solution before, on states that an extended Kalman filter estimates along with a constant disturbance of the
+    outputs. Weights, bounds and noise are those of the study's MPC.
+
+    Parameters
+    ----------
+    model
+        ``"rod"``, the plant's own; ``"constant curvature"``, the same with one curvature about each axis along all of
+        its length and nothing else.
+    horizon
+        Samples that are looked ahead.
+    iterations
+        Programs a sample.
+    """
+
+    model: Literal["rod", "constant curvature"] = "rod"
+    horizon: int = 20
+    iterations: int = 2
+
+    @property
+    def information(self) -> Information:
+        return "plant model"
+
+    def offers(self, lab: Lab) -> Iterator[Pilot]:
+        plant = lab.study.plant
+        if not isinstance(plant, SimulatedPlant):
+            raise TypeError(f"only a simulated rod has a model to take, not {type(plant).__name__}")
+        rod = plant.rod
+        if self.model == "constant curvature":
+            rod = replace(rod, strain=Strain(bending_y=0, bending_z=0))
+        yield _Controller(lab.study.mpc, SimulatedPlant(rod, plant.sample_time, 0.0, plant.output), self)
+
+
+class _Controller(Law):
+    def __init__(self, mpc: LinearMPC, plant: SimulatedPlant, method: NonlinearMPC) -> None:
+        super().__init__(mpc)
+        self._rod, self._method = plant.rod, method
+        x, u = ca.MX.sym("x", 2 * plant.rod.dof), ca.MX.sym("u", mpc.inputs)  # pyright: ignore[reportArgumentType]
+        step = plant.rod.step_expression(mpc.sample_time)
+        after, slope = step(x, u, ca.DM.zeros(3)), ca.Function("slope", [x], [ca.jacobian(plant.sensor(x), x)])
+        outputs = [after, ca.jacobian(after, x), ca.jacobian(after, u), plant.sensor(after), slope(after)]
+        # From one sample to the next: state, its derivatives, output, its derivative.
+        self._advance = Buffered(compiled(ca.Function("advance", [x, u], [ca.densify(value) for value in outputs])))
+        self._rest = plant.sensor
+        self.begin()
+
+    def begin(self) -> None:
+        order, p = 2 * self._rod.dof, self.mpc.outputs
+        self._x = self._rod.equilibrium(self.held).state
+        self._disturbance = np.zeros(p)
+        self._planned = np.tile(self.held, (self._method.horizon, 1))
+        # It rests where it is thought to rest, but for what the model gets wrong.
+        self._covariance = np.diag(np.concatenate([np.full(order, 1e-10), np.full(p, 1e-4)]))
+        self._first = True
+
+    def act(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
+        self._estimate(y)
+        self._planned = np.vstack([self._planned[1:], self._planned[-1:]])
+        wanted = looked_ahead(reference, self._method.horizon)
+        for _ in range(self._method.iterations):
+            self._planned = self._improved(wanted)
+            if not np.isfinite(self._planned).all():
+                self._planned = np.tile(self.held, (self._method.horizon, 1))
+                return np.full(self.mpc.inputs, np.nan)
+        return self._planned[0]
+
+    def _sample(self, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, ...]:
+        """State a sample later, its derivatives by x and u, output then, its derivative by that state."""
+        after, A, B, y, C = self._advance(x, u)
+        n = len(x)
+        # CasADi's matrices come column by column.
+        return after, A.reshape(n, n).T, B.reshape(len(u), n).T, y, C.reshape(n, len(y)).T
+
+    def _estimate(self, y: np.ndarray) -> None:
+        """Correct what is believed of state and disturbance by a measurement (extended Kalman filter)."""
+        noise, n, p = self.mpc.noise, len(self._x), self.mpc.outputs
+        if self._first:
+            expected, C = (value.full() for value in (self._rest(self._x), self._rest.jacobian()(self._x, 0)))
+            expected = expected[:, 0]
+        else:
+            self._x, A, B, expected, C = self._sample(self._x, self.held)
+            self._covariance[:n] = A @ self._covariance[:n]
+            self._covariance[:, :n] = self._covariance[:, :n] @ A.T
+            self._covariance[:n, :n] += B @ noise.input @ B.T
+            self._covariance[n:, n:] += noise.disturbance
+        self._first = False
+        seen = np.hstack([C, np.eye(p)])
+        spread = seen @ self._covariance @ seen.T + noise.measurement
+        gain = np.linalg.solve(spread, seen @ self._covariance).T
+        correction = gain @ (y - expected - self._disturbance)
+        self._x, self._disturbance = self._x + correction[:n], self._disturbance + correction[n:]
+        self._covariance = self._covariance - gain @ seen @ self._covariance
+
+    def _improved(self, wanted: np.ndarray) -> np.ndarray:
+        """The plan (N, m) after one more program, about the flight that the present one gives."""
+        N, (p, m), scale = self._method.horizon, (self.mpc.outputs, self.mpc.inputs), self.mpc.input_scale
+        x, by_plan = self._x, np.zeros((len(self._x), N * m))
+        expected, slopes = np.zeros((N, p)), np.zeros((N, p, N * m))
+        for k, u in enumerate(self._planned):
+            x, A, B, expected[k], C = self._sample(x, u)
+            by_plan = A @ by_plan
+            by_plan[:, k * m : (k + 1) * m] += B * scale
+            slopes[k] = C @ by_plan
+        if not np.isfinite(slopes).all():
+            return np.full_like(self._planned, np.nan)
+        now = (expected + self._disturbance).reshape(-1, 1)
+        forecast = Forecast(
+            input=(np.eye(N * m), (self._planned / scale).reshape(-1, 1)),
+            output=(slopes.reshape(N * p, -1), now),
+            reference=wanted.reshape(-1, 1),
+            before=(self.held / scale)[:, None],
+        )
+        return Program(self.mpc, forecast).inputs(np.ones(1), self.info)

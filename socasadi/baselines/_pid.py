@@ -1,0 +1,66 @@
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..campaign import Pilot
+from ..model import Entry
+from ..mpc import LinearMPC
+from ._lab import Lab
+from ._law import Law
+from ._method import Method, identified, static_gain, tuned
+
+
+@dataclass(frozen=True)
+class PID(Method):
+    r"""Three terms per output through the inverse static Jacobian, which an identified model gives:
+
+    .. math:: u = G^+ (r + k_p e + k_i \int e\, dt + k_d \dot e_f)
+
+    with the error's derivative filtered. The four numbers are tuned by flights.
+
+    Parameters
+    ----------
+    probing
+        s of probing.
+    """
+
+    probing: float = 20.0
+
+    def offers(self, lab: Lab) -> Iterator[Pilot]:
+        inverse = np.linalg.pinv(static_gain(identified(lab, self.probing)))
+        knobs = (
+            Entry("proportional", "1", 0.01, 10.0, "log"),
+            Entry("integral", "1/s", 0.05, 20.0, "log"),
+            Entry("derivative", "s", 0.001, 2.0, "log"),
+            Entry("filter", "s", 0.01, 1.0, "log"),
+        )
+        mpc = lab.study.mpc
+        return tuned(lab, knobs, lambda gains: _Controller(mpc, inverse, gains), initial=[(0.1, 1.0, 0.05, 0.1)])
+
+
+class _Controller(Law):
+    def __init__(self, mpc: LinearMPC, inverse: np.ndarray, gains: np.ndarray) -> None:
+        super().__init__(mpc)
+        self._inverse, self._gains = inverse, gains
+        self.begin()
+
+    def begin(self) -> None:
+        self._integral, self._slope = np.zeros(self.mpc.outputs), np.zeros(self.mpc.outputs)
+        self._error: np.ndarray | None = None
+
+    def act(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
+        proportional, integral, derivative, filtered = self._gains
+        time, error = self.mpc.sample_time, reference[0] - y
+        if self._error is not None:
+            smooth = time / (time + filtered)
+            self._slope = self._slope + smooth * ((error - self._error) / time - self._slope)
+        self._error = error
+        known = reference[0] + proportional * error + derivative * self._slope
+        summed = self._integral + time * error
+        u = self._inverse @ (known + integral * summed)
+        lower, upper = self.mpc.input_limits
+        if ((u >= lower) & (u <= upper)).all():  # at a bound the integral waits, lest it winds up
+            self._integral = summed
+            return u
+        return self._inverse @ (known + integral * self._integral)

@@ -1,0 +1,24 @@
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from ..campaign import Pilot
+from ._lab import Lab
+from ._method import Method, tuned
+
+
+@dataclass(frozen=True)
+class ModelSearch(Method):
+    """The prediction model that controls best, sought in closed loop: what this package is for.
+
+    Parameters
+    ----------
+    kind
+        ``"bayesian"``; ``"sobol"`` and ``"random"`` are points that learn nothing, on the same theta.
+    """
+
+    kind: Literal["bayesian", "sobol", "random"] = "bayesian"
+
+    def offers(self, lab: Lab) -> Iterator[Pilot]:
+        mpc = lab.study.mpc
+        return tuned(lab, mpc.model.entries, mpc.controller, kind=self.kind)
