@@ -174,7 +174,8 @@ def test_while_all_trials_are_cut_it_keeps_exploring():
     assert repeats(told(search), 1e-3) == 0
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 2])
 def test_experiments_cut_above_one_and_a_half_times_the_best_teach_as_much_as_whole_ones(seed):
     def search(cut):
         search = Optimizer(BRANIN, seed=seed, seed_points=6)
