@@ -4,8 +4,10 @@ A method is a :class:`Method`: it spends the time of a :class:`Lab` and offers c
 experiment costs is the same for all: see there.
 """
 
+from ._compare import Comparison, Size, load_comparison, run_comparison, stored_cells
 from ._deepc import DeePC
 from ._fixed import Identified, Linearised
+from ._judge import Elsewhere, Worth, worth, worth_elsewhere
 from ._koopman import Koopman
 from ._lab import BudgetSpent, Lab
 from ._law import Forecast, Law, Program, looked_ahead
@@ -13,14 +15,19 @@ from ._learning import IterativeLearning
 from ._method import Information, Method, identified, static_gain, tuned
 from ._nonlinear import NonlinearMPC
 from ._pid import PID
+from ._robust import HInfinity
 from ._search import ModelSearch
+from ._subspace import Subspace
 from ._weights import Weights
 
 __all__ = [
     "PID",
     "BudgetSpent",
+    "Comparison",
     "DeePC",
+    "Elsewhere",
     "Forecast",
+    "HInfinity",
     "Identified",
     "Information",
     "IterativeLearning",
@@ -32,9 +39,17 @@ __all__ = [
     "ModelSearch",
     "NonlinearMPC",
     "Program",
+    "Size",
+    "Subspace",
     "Weights",
+    "Worth",
     "identified",
+    "load_comparison",
     "looked_ahead",
+    "run_comparison",
     "static_gain",
+    "stored_cells",
     "tuned",
+    "worth",
+    "worth_elsewhere",
 ]

@@ -1,3 +1,4 @@
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -22,10 +23,10 @@ class IterativeLearning(Method):
     Norm-optimal iterative learning control (Bristow, Tharayil, Alleyne, "A survey of iterative learning control", IEEE
     Control Systems Magazine 26(3), 2006) about the study's MPC on an identified model. The shift c (T, p) changes by
 
-    .. math:: \arg\min_\Delta\; |e - T_y \Delta|_Q^2 + |\Delta u + T_u \Delta|_R^2 + \mu |\Delta|_Q^2,
+    .. math:: \arg\min_\Delta\; |e - T_y \Delta|_Q^2 + |\Delta u + T_u \Delta|_R^2 + j \mu |\Delta|_Q^2,
 
-    where e and :math:`\Delta u` are the errors and changes of inputs of the last flight and T says how the loop answers
-    to a shift, by the identified model. What is learned is good for this one task alone.
+    where e and :math:`\Delta u` are the errors and changes of inputs of the last flight, the j-th, and T says how the
+    loop answers to a shift, by the identified model. What is learned is good for this one task alone.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ class IterativeLearning(Method):
     """
 
     probing: float = 20.0
-    caution: float = 1.0
+    caution: float = 3.0
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         study, mpc, model = lab.study, lab.study.mpc, identified(lab, self.probing)
@@ -50,9 +51,9 @@ class IterativeLearning(Method):
             np.kron(np.eye(count), weight_matrix(weight, size, name))
             for weight, size, name in ((study.cost.Q, p, "Q of the cost"), (study.cost.R, m, "R of the cost"))
         )
-        normal = cho_factor(to_y.T @ Q @ to_y + to_change.T @ R @ to_change + self.caution * Q)
+        curvature = to_y.T @ Q @ to_y + to_change.T @ R @ to_change
         shift, least = np.zeros((count, p)), np.inf
-        while True:
+        for run in itertools.count(1):
             pilot = _Shifted(controller, shift)
             episode = lab.fly(pilot)
             if (J := lab.cost(episode)) is None:
@@ -62,6 +63,8 @@ class IterativeLearning(Method):
                 yield pilot
             error = (episode.reference - episode.output)[1:].ravel()
             change = np.diff(np.vstack([episode.held, episode.tension]) / mpc.input_scale, axis=0).ravel()
+            # Each step is smaller than the one before, so that the noise of flights averages out.
+            normal = cho_factor(curvature + run * self.caution * Q)
             step = cho_solve(normal, to_y.T @ Q @ error - to_change.T @ R @ change)
             shift = shift + step.reshape(count, p)
 

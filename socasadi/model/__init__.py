@@ -3,7 +3,7 @@
 from ._base import PredictionModel, StateSpace
 from ._dense import Dense
 from ._entry import Entry
-from ._identify import bounds_from_record, identify, prediction_error
+from ._identify import bounds_from_record, identify, prediction_error, state_space_error
 from ._modal import Modal
 from ._record import Record
 
@@ -17,4 +17,5 @@ __all__ = [
     "bounds_from_record",
     "identify",
     "prediction_error",
+    "state_space_error",
 ]

@@ -16,8 +16,12 @@ def prediction_error(model: PredictionModel, theta: ArrayLike, record: Record) -
     prediction overflows.
     """
     _check_fit(model, record)
-    residual = _residual(model.state_space(theta, record.sample_time), record)
-    return float(np.sqrt(np.mean(np.sum(residual**2, axis=1))))
+    return state_space_error(model.state_space(theta, record.sample_time), record)
+
+
+def state_space_error(system: StateSpace, record: Record) -> float:
+    """:func:`prediction_error` of a model that is given as it is."""
+    return float(np.sqrt(np.mean(np.sum(_residual(system, record) ** 2, axis=1))))
 
 
 def identify(

@@ -7,7 +7,7 @@ from ._loop import run_campaign
 from ._outcome import best_trial, flown_cost, keeps_limits, replayed
 from ._processes import Processes
 from ._progress import Clock, Progress, clock, print_progress, progress_line
-from ._script import load_study
+from ._script import load_script, load_study
 
 __all__ = [
     "Campaign",
@@ -21,6 +21,7 @@ __all__ = [
     "flown_cost",
     "fly_once",
     "keeps_limits",
+    "load_script",
     "load_study",
     "print_progress",
     "progress_line",

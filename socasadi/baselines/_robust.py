@@ -1,0 +1,124 @@
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_continuous_are
+from scipy.signal import cont2discrete
+
+from ..campaign import Pilot
+from ..model import Entry, StateSpace
+from ..mpc import DesignError, LinearMPC
+from ._lab import Lab
+from ._law import Law
+from ._method import Method, identified, static_gain, tuned
+
+_ABOVE_LEAST = 1.1
+"""gamma of the controller, as a factor on the least that there is."""
+_SLOW = 1e-3
+"""rad/s, pole that stands for an integrator."""
+
+
+@dataclass(frozen=True)
+class HInfinity(Method):
+    r"""H-infinity loop shaping on an identified model, behind the inverse static Jacobian.
+
+    The plant, shaped by :math:`W = k (s + w) / s` in each channel, gets the controller that is the most robust against
+    perturbations of its normalised coprime factors (McFarlane, Glover, "A loop-shaping design procedure using
+    H-infinity synthesis", IEEE Trans. Automatic Control 37, 1992; formulas of Skogestad, Postlethwaite, "Multivariable
+    feedback control", 2005, section 9.4). The gain k, the corner w and a share of the reference that is fed forward are
+    tuned by flights.
+
+    Parameters
+    ----------
+    probing
+        s of probing.
+    """
+
+    probing: float = 20.0
+
+    def offers(self, lab: Lab) -> Iterator[Pilot]:
+        mpc, model = lab.study.mpc, identified(lab, self.probing)
+        inverse = np.linalg.pinv(static_gain(model))
+        knobs = (
+            Entry("gain", "1", 0.03, 30.0, "log"),
+            Entry("corner", "rad/s", 0.1, 30.0, "log"),
+            Entry("fed forward", "1", 0.0, 1.0),
+        )
+        return tuned(lab, knobs, lambda x: _Controller(mpc, model, inverse, *x), initial=[(0.3, 2.0, 1.0)])
+
+
+class _Controller(Law):
+    """v = forward r + W (K y - K(0) r), u = inverse v, where y - forward r is what is left to do."""
+
+    def __init__(
+        self, mpc: LinearMPC, model: StateSpace, inverse: np.ndarray, gain: float, corner: float, forward: float
+    ) -> None:
+        super().__init__(mpc)
+        p, one = mpc.outputs, np.eye(mpc.outputs)
+        # k (s + w) / (s + slow)
+        shaper = StateSpace(-_SLOW * one, one, gain * (corner - _SLOW) * one, gain * one)
+        plant = _in_tustins_variable(model, inverse, mpc.sample_time)
+        robust = _most_robust(_series(plant, shaper))
+        self._static = robust.D - robust.C @ np.linalg.solve(robust.A, robust.B)
+        self._inverse, self._forward = inverse, forward
+        self._robust, self._shaper = (
+            StateSpace(*cont2discrete(tuple(system), mpc.sample_time, "bilinear")[:4]) for system in (robust, shaper)
+        )
+        self._sizes = len(robust.A), p
+        self.begin()
+
+    def begin(self) -> None:
+        self._x, self._integral = (np.zeros(size) for size in self._sizes)
+
+    def act(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
+        robust, shaper = self._robust, self._shaper
+        wanted = reference[0]
+        left = y - self._forward * wanted
+        answer = robust.C @ self._x + robust.D @ left - (1 - self._forward) * self._static @ wanted
+        u = self._inverse @ (self._forward * wanted + shaper.C @ self._integral + shaper.D @ answer)
+        self._x = robust.A @ self._x + robust.B @ left
+        lower, upper = self.mpc.input_limits
+        if ((u >= lower) & (u <= upper)).all():  # at a bound the integral waits, lest it winds up
+            self._integral = shaper.A @ self._integral + shaper.B @ answer
+        return u
+
+
+def _in_tustins_variable(model: StateSpace, inverse: np.ndarray, time: float) -> StateSpace:
+    """The model from wanted to measured outputs, as a system in continuous time whose Tustin image it is."""
+    A, B, C, D = model
+    # y after the step of x -> y before the next one.
+    B, C, D = B @ inverse, C @ A, (C @ B + D) @ inverse
+    plus = np.linalg.inv(A + np.eye(len(A)))
+    root = 2 / np.sqrt(time)
+    return StateSpace(2 / time * plus @ (A - np.eye(len(A))), root * plus @ B, root * C @ plus, D - C @ plus @ B)
+
+
+def _series(after: StateSpace, before: StateSpace) -> StateSpace:
+    return StateSpace(
+        np.block([[after.A, after.B @ before.C], [np.zeros((len(before.A), len(after.A))), before.A]]),
+        np.vstack([after.B @ before.D, before.B]),
+        np.hstack([after.C, after.D @ before.C]),
+        after.D @ before.D,
+    )
+
+
+def _most_robust(plant: StateSpace) -> StateSpace:
+    """The controller y -> u, of positive feedback, that is the most robust for a shaped plant, or nearly so.
+
+    Raises
+    ------
+    DesignError
+        The Riccati equations have no solution.
+    """
+    A, B, C, D = plant
+    R, S = np.eye(len(C)) + D @ D.T, np.eye(B.shape[1]) + D.T @ D
+    across = A - B @ np.linalg.solve(S, D.T @ C)
+    try:
+        X = solve_continuous_are(across, B, C.T @ np.linalg.solve(R, C), S)
+        Z = solve_continuous_are(across.T, C.T, B @ np.linalg.solve(S, B.T), R)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        raise DesignError(f"no robust controller: {error}") from error
+    square = (_ABOVE_LEAST**2) * (1 + float(np.abs(np.linalg.eigvals(X @ Z)).max()))
+    F = -np.linalg.solve(S, D.T @ C + B.T @ X)
+    gain = square * np.linalg.solve(((1 - square) * np.eye(len(A)) + X @ Z).T, Z @ C.T)
+    return StateSpace(A + B @ F + gain @ (C + D @ F), gain, B.T @ X, -D.T)
