@@ -11,6 +11,7 @@ from rich.table import Table
 
 from ._bench_commands import ask, init, tell
 from ._check_command import RobotRecord, SpecSheet, check_, checked
+from ._compare_command import compare
 from ._run_command import run
 from ._sparkline import sparkline
 from ._terminal import (
@@ -50,7 +51,7 @@ app = typer.Typer(
 )
 
 app.command(name="check")(check_)
-for command in (run, init, ask, tell):
+for command in (run, init, ask, tell, compare):
     app.command()(command)
 
 

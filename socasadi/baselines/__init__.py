@@ -14,17 +14,22 @@ from ._law import Forecast, Law, Program, looked_ahead
 from ._learning import IterativeLearning
 from ._method import Information, Method, identified, static_gain, tuned
 from ._nonlinear import NonlinearMPC
+from ._others import DeadCable, Delayed, Loaded, Misrouted, Noisier, Rubbing, Softer
 from ._pid import PID
 from ._robust import HInfinity
 from ._search import ModelSearch
 from ._subspace import Subspace
+from ._summary import Summary
+from ._summary import table as summary_table
 from ._weights import Weights
 
 __all__ = [
     "PID",
     "BudgetSpent",
     "Comparison",
+    "DeadCable",
     "DeePC",
+    "Delayed",
     "Elsewhere",
     "Forecast",
     "HInfinity",
@@ -35,12 +40,18 @@ __all__ = [
     "Lab",
     "Law",
     "Linearised",
+    "Loaded",
     "Method",
+    "Misrouted",
     "ModelSearch",
+    "Noisier",
     "NonlinearMPC",
     "Program",
+    "Rubbing",
     "Size",
+    "Softer",
     "Subspace",
+    "Summary",
     "Weights",
     "Worth",
     "identified",
@@ -49,6 +60,7 @@ __all__ = [
     "run_comparison",
     "static_gain",
     "stored_cells",
+    "summary_table",
     "tuned",
     "worth",
     "worth_elsewhere",

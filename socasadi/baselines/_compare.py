@@ -14,7 +14,7 @@ import numpy as np
 
 from ..campaign import Study, Task, load_script
 from ..campaign.store import RunError, describe
-from ._judge import Elsewhere, worth, worth_elsewhere
+from ._judge import Elsewhere, open_loop_error, worth, worth_elsewhere
 from ._lab import BudgetSpent, Lab
 from ._method import Method
 
@@ -76,7 +76,7 @@ class Comparison:
         """The comparison as it is (``"full"``), or less of it.
 
         ``"quick"``: the first three seeds, checkpoints up to 30, three flights. ``"smoke"``, whether it works at all:
-        one seed, the first two tasks for 3 s, checkpoints up to 3, one flight, one other robot.
+        one seed, the first two tasks for 3 s, checkpoints up to 20, one flight, one other robot.
         """
         match size:
             case "full":
@@ -86,7 +86,7 @@ class Comparison:
                 return replace(self, seeds=tuple(self.seeds)[:3], checkpoints=points, flights=min(self.flights, 3))
             case "smoke":
                 tasks = {name: self._short(name) for name in list(self.tasks)[:2]}
-                points = tuple(at for at in self.checkpoints if at <= 3) or tuple(self.checkpoints[:1])
+                points = tuple(at for at in self.checkpoints if at <= 20) or tuple(self.checkpoints[:1])
                 few = {"seeds": tuple(self.seeds)[:1], "checkpoints": points, "flights": 1}
                 others = dict(list(self.elsewhere.items())[:1])
                 on = tuple(name for name in self.elsewhere_on if name in tasks)
@@ -124,7 +124,10 @@ class Comparison:
 
 
 def fly_cell(comparison: Comparison, task: str, method: str, seed: int) -> dict[str, Any]:
-    """All that a cell gives, as JSON data: what the method had to offer at each checkpoint, and what it had cost."""
+    """All that a cell gives, as JSON data: what the method had to offer at each checkpoint, and what it had cost.
+
+    What is not finite, such as J of a flight that failed, is null.
+    """
     study, began = comparison.of(task, seed), time.perf_counter()
     seconds = [at * study.task.duration for at in comparison.checkpoints]
     lab, offers, broke = Lab(study, seconds), {}, None
@@ -148,7 +151,7 @@ def fly_cell(comparison: Comparison, task: str, method: str, seed: int) -> dict[
         points.append(judged[id(pilot)])
     last = offers.get(seconds[-1])
     others = comparison.elsewhere if last and task in comparison.elsewhere_on else {}
-    return {
+    cell = {
         "digest": comparison.digest(task, method, seed),
         "task": task,
         "method": method,
@@ -163,12 +166,26 @@ def fly_cell(comparison: Comparison, task: str, method: str, seed: int) -> dict[
         }
         if last
         else {},
+        "open_loop": open_loop_error(study, last[0]) if last else np.nan,
         "flights": lab.flights,
         "failed": lab.failed,
         "spent": lab.spent,
         "broke": broke,
         "wall": time.perf_counter() - began,
     }
+    return _finite(cell)
+
+
+def _finite(value: Any) -> Any:
+    """JSON data in which what is not a finite number is null."""
+    match value:
+        case dict():
+            return {key: _finite(item) for key, item in value.items()}
+        case list() | tuple():
+            return [_finite(item) for item in value]
+        case float() if not np.isfinite(value):
+            return None
+    return value
 
 
 def load_comparison(script: Path, size: Size = "full") -> Comparison:

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..campaign import Pilot, Study, fly_once
-from ..mpc import ControllerInfo, LinearMPC
+from ..campaign import Pilot, Study, fly_once, probe
+from ..model import StateSpace, state_space_error
+from ..mpc import Controller, ControllerInfo, LinearMPC
 from ..plant import Plant
 
 _VERIFICATION = 1
@@ -77,6 +78,20 @@ def worth(study: Study, pilot: Pilot, flights: int) -> tuple[Worth, np.ndarray]:
     steps = np.array(timed.seconds or [np.nan])
     solve = (float(np.median(steps)), float(np.quantile(steps, 0.99)), float(steps.max()))
     return Worth(tuple(J), tuple(rmse), settled, violated, effort, solve, fallbacks), path
+
+
+def open_loop_error(study: Study, pilot: Pilot) -> float:
+    """How far the prediction model in a controller is off on a probing record that no method has seen, m.
+
+    Root mean square distance over the record, without any correction; NaN of a controller without a linear model.
+    """
+    if not isinstance(pilot, Controller) or pilot.mpc.delay or pilot.mpc.measured_disturbances:
+        return np.nan
+    design, scale = pilot.design, pilot.mpc.input_scale
+    n = design.order - design.outputs  # without the disturbances behind the model's own states
+    model = StateSpace(design.A[:n, :n], design.B[:n] / scale, design.C[:, :n], design.D / scale)
+    seed = int(np.random.SeedSequence([study.seed, _VERIFICATION, 0]).generate_state(1)[0])
+    return state_space_error(model, probe(study.plant, study.mpc.input_bounds, seed=seed))
 
 
 def worth_elsewhere(study: Study, pilot: Pilot, flights: int, others: Elsewhere) -> dict[str, Worth]:

@@ -1,6 +1,7 @@
 """Figures, animations and the page of a run, and the look that they share, for figures of one's own; it only draws."""
 
 from ._animation import animate
+from ._comparison import comparison_figures
 from ._convergence import best_so_far, cost_axis
 from ._figures import figures, save_figures
 from ._reach import reach_figure
@@ -17,6 +18,7 @@ __all__ = [
     "SETTINGS",
     "animate",
     "best_so_far",
+    "comparison_figures",
     "cost_axis",
     "figures",
     "html_report",

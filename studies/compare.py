@@ -1,0 +1,82 @@
+"""Would you have got there without Bayesian optimisation: this package beside twelve other ways to a controller.
+
+    socasadi compare studies/compare.py --smoke       does it work: under two minutes
+    socasadi compare studies/compare.py --quick       three seeds, 30 episodes' worth of the robot's time
+    socasadi compare studies/compare.py               ten seeds, 110 episodes' worth; goes on where it was stopped
+
+All methods are lent the same simulated arm for the same time, and their controllers are flown under noise that none has
+seen. The first method is the one that the others are compared with.
+"""
+
+from dataclasses import replace
+
+from circle import study as circle
+
+from socasadi import Circle, FigureEight, Origin, Rod, SetPoints, SimulatedPlant
+from socasadi.baselines import (
+    PID,
+    Comparison,
+    DeadCable,
+    DeePC,
+    Delayed,
+    HInfinity,
+    Identified,
+    IterativeLearning,
+    Koopman,
+    Linearised,
+    Loaded,
+    Misrouted,
+    ModelSearch,
+    Noisier,
+    NonlinearMPC,
+    Rubbing,
+    Softer,
+    Subspace,
+    Weights,
+)
+from socasadi.rod import Payload
+
+loaded = SimulatedPlant(replace(Rod.preset("paper"), payloads=Payload(0.1)), sample_time=0.05, noise=1e-3)
+stairs = ((0.02, 0.0), (0.04, 0.0), (0.06, 0.0), (0.03, 0.03))
+
+comparison = Comparison(
+    study=circle,
+    tasks={
+        "circle": Circle(radius=0.05, period=20.0),
+        "origin": Origin(tip=(-0.01, 0.04)),
+        "eight": FigureEight(width=0.05, height=0.025, period=20.0),
+        "stairs": SetPoints(points=stairs, hold=5.0),
+        "80 mm": SetPoints(points=((0.08, 0.0),)),
+        "payload": replace(circle, plant=loaded),
+    },
+    methods={
+        "socasadi": ModelSearch(),
+        "Sobol": ModelSearch("sobol"),
+        "random": ModelSearch("random"),
+        "identified": Identified(),
+        "N4SID": Subspace(),
+        "weights": Weights(),
+        "PID": PID(),
+        "H-infinity": HInfinity(),
+        "Koopman": Koopman(),
+        "DeePC": DeePC(),
+        "velocity DeePC": DeePC(velocity=True),
+        "ILC": IterativeLearning(),
+        "linearised": Linearised(),
+        "nonlinear MPC": NonlinearMPC(),
+        "constant curvature": NonlinearMPC("constant curvature"),
+    },
+    elsewhere={
+        "E -20 %": Softer(young=0.8),
+        "E +20 %": Softer(young=1.2),
+        "damping -20 %": Softer(damping=0.8),
+        "damping +20 %": Softer(damping=1.2),
+        "100 g at the tip": Loaded(0.1),
+        "cable 1 at 24 mm": Misrouted(1.2),
+        "noise x 3": Noisier(3.0),
+        "cable 1 dead": DeadCable(0),
+        "friction 0.3": Rubbing(0.3),
+        "1 sample late": Delayed(1),
+    },
+    elsewhere_on=("circle",),
+)
