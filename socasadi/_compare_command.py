@@ -58,9 +58,10 @@ def compare(
         raise typer.Exit(130) from None
     summary = Summary.of(cells, list(comparison.tasks), list(comparison.methods))
     rows = summary_table(summary)
-    out.print(
-        table(rows, left=("task", "method", "knows"), title=f"\nafter {summary.checkpoints[-1]} episodes' worth:")
-    )
+    for task in summary.tasks:
+        shown = [{k: v for k, v in row.items() if k not in ("task", "knows")} for row in rows if row["task"] == task]
+        title = f"\n{task}, after {summary.checkpoints[-1]} episodes' worth of the robot's time:"
+        out.print(table(shown, left=("method",), title=title))
     out.print(table(_rivals(summary), left=("method", "knows"), title=f"\n{summary.methods[0]} against, in J:"))
     for task in comparison.elsewhere_on:
         out.print(table(_elsewhere(summary, task), left=("method",), title=f"\n{task}, J on other robots:"))

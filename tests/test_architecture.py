@@ -21,10 +21,12 @@ ROOMS = {
     "export": {"mpc", "codegen"},
     "campaign": {"plant", "model", "mpc", "tune", "export"},
     "feasibility": {"rod", "plant", "model", "mpc", "campaign"},
+    "baselines": {"rod", "plant", "model", "mpc", "tune", "campaign"},
     "report": {"rod", "plant", "campaign", "baselines", "feasibility", "matplotlib"},
 }
 # What a room is made of beyond its table: libraries that serve one purpose in one room.
 LIBRARIES = {
+    "baselines": {"threadpoolctl"},
     "campaign": {"distributed"},
     "codegen": {"platformdirs"},
     "export": {"jinja2"},
@@ -32,10 +34,11 @@ LIBRARIES = {
     "tune": {"threadpoolctl"},
 }
 # casadi is the language of everything symbolic, and a model's matrices are part of what is exported. Whether single
-# precision does is tried by the very test of the export.
+# precision does is tried by the very test of the export. A nonlinear MPC compiles the derivatives of a rod.
 GRANTED = {
     "plant": {"casadi"},
     "export": {"model"},
+    "baselines": {"casadi", "codegen"},
     "feasibility": {"casadi", "codegen", "export"},
     "report": {"casadi", "tune"},
 }

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from ..campaign import Study, Task, load_script
 from ..campaign.store import RunError, describe
@@ -128,6 +129,11 @@ def fly_cell(comparison: Comparison, task: str, method: str, seed: int) -> dict[
 
     What is not finite, such as J of a flight that failed, is null.
     """
+    with threadpool_limits(1):  # cells are flown side by side; threads that wait for each other would take ages
+        return _flown(comparison, task, method, seed)
+
+
+def _flown(comparison: Comparison, task: str, method: str, seed: int) -> dict[str, Any]:
     study, began = comparison.of(task, seed), time.perf_counter()
     seconds = [at * study.task.duration for at in comparison.checkpoints]
     lab, offers, broke = Lab(study, seconds), {}, None

@@ -55,9 +55,9 @@ def n4sid(record: Record, order: int) -> StateSpace:
         The package sippy_unipi is not installed.
     """
     sippy = needed("sippy_unipi", "subspace identification")
-    # Theirs: y_k = C x_k + D u_k, where y_k is what u_k has led to; ours has y after the step of x.
+    # In theirs y_k = C x_k comes before u_k, in ours after: the same, with the index of y moved by one.
     found = sippy.system_identification(
-        record.output[1:].T,
+        record.output[:-1].T,
         record.tension.T,
         "N4SID",
         SS_f=_WINDOW,
@@ -65,6 +65,5 @@ def n4sid(record: Record, order: int) -> StateSpace:
         SS_fixed_order=order,
         SS_A_stability=True,
     )
-    A, B, C, D = (np.asarray(getattr(found, name), dtype=float) for name in "ABCD")
-    back = C @ np.linalg.inv(A)
-    return StateSpace(A, B, back, D - back @ B)
+    A, B, C = (np.asarray(getattr(found, name), dtype=float) for name in "ABC")
+    return StateSpace(A, B, C, np.zeros((len(C), B.shape[1])))

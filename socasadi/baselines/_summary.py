@@ -46,11 +46,9 @@ class Summary:
         return np.array([np.inf if point is None else _median(point[name]) for point in points])
 
     def over_time(self, task: str, method: str, name: str = "J") -> np.ndarray:
-        """Quartiles (checkpoints, 3) over the seeds."""
+        """Quartiles (checkpoints, 3) over the seeds; those of infinite values are infinite."""
         rows = [self.values(task, method, name, i) for i in range(len(self.checkpoints))]
-        return np.array(
-            [np.quantile(row, (0.25, 0.5, 0.75), method="nearest") if len(row) else [np.inf] * 3 for row in rows]
-        )
+        return np.array([np.quantile(row, (0.25, 0.5, 0.75), method="nearest") for row in rows])
 
     def rivalry(self, method: str, checkpoint: int = -1) -> tuple[int, int, float]:
         """How the first method stands against another, in J: tasks that it wins in the median, tasks, and p.
@@ -73,24 +71,14 @@ class Summary:
         return won, len(tasks), float(wilcoxon(ratios).pvalue)
 
     def elsewhere(self, task: str) -> tuple[list[str], dict[str, np.ndarray]]:
-        """Other robots by name, and J there (robots,) by method, medians over flights and seeds; infinite: it failed."""
-        names: list[str] = []
+        """Names of other robots, and by method J there (robots,), medians over flights and seeds; infinite: failed."""
+        names = next((list(c["elsewhere"]) for m in self.methods for c in self.of_pair(task, m) if c["elsewhere"]), [])
+        told: dict[str, np.ndarray] = {}
         for method in self.methods:
-            for cell in self.of_pair(task, method):
-                names = names or list(cell["elsewhere"])
-        told = {
-            method: np.array(
-                [
-                    np.median(
-                        [_median(cell["elsewhere"][name]["J"]) for cell in cells if name in cell["elsewhere"]]
-                        or [np.inf]
-                    )
-                    for name in names
-                ]
-            )
-            for method in self.methods
-            if (cells := self.of_pair(task, method))
-        }
+            flown = [cell["elsewhere"] for cell in self.of_pair(task, method) if cell["elsewhere"]]
+            if flown:
+                costs = [[_median(others[name]["J"]) for name in names] for others in flown]
+                told[method] = np.median(costs, axis=0)
         return names, told
 
 
@@ -115,21 +103,21 @@ def table(summary: Summary, checkpoint: int = -1) -> list[dict[str, str]]:
 
             points = [cell["points"][checkpoint] for cell in cells]
             solve = np.array([p["solve"] for p in points if p and None not in p["solve"]], dtype=float)
-            steps = [f"{1e6 * t:.3g}" for t in np.median(solve, axis=0)] if len(solve) else ["-"] * 3
+            steps = [f"{1e6 * t:,.0f}" for t in np.median(solve, axis=0)] if len(solve) else ["-"] * 3
             rows.append(
                 {
                     "task": task,
                     "method": method,
                     "knows": cells[0]["information"],
-                    "robot's time / s": told("spent", form=".0f"),
+                    "robot / s": told("spent", form=".0f"),
                     "J": told("J"),
                     "RMSE / mm": told("rmse", 1e3),
                     "settled / mm": told("settled", 1e3),
                     "violated / %": told("violated", 1e2),
                     "effort / %": told("effort", 1e2),
-                    "step / us: p50": steps[0],
-                    "p99": steps[1],
-                    "max": steps[2],
+                    "step p50 / us": steps[0],
+                    "p99 / us": steps[1],
+                    "max / us": steps[2],
                     "failed": f"{sum(c['failed'] for c in cells)} of {sum(c['flights'] for c in cells)}",
                     "open-loop / mm": _open_loop(cells),
                 }

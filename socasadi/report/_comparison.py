@@ -4,6 +4,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
@@ -59,18 +60,17 @@ def _grid(summary: Summary, note: str, row: float, below: float) -> tuple[Figure
     columns = min(3, len(summary.tasks))
     rows = -(-len(summary.tasks) // columns)
     figure = Figure(figsize=(PAGE, (row * rows + below) * MM))
-    figure.get_layout_engine().set(rect=(0, below / (row * rows + below), 1, 1 - below / (row * rows + below)))  # pyright: ignore
     axes = list(figure.subplots(rows, columns, squeeze=False).ravel())
     for spare in axes[len(summary.tasks) :]:
         spare.set_visible(False)
     for place, task in zip(axes, summary.tasks, strict=False):
         place.set_title(task, loc="left")
-    figure.text(0.005, 0.005, note, fontsize=6, color=GREY)
+    figure.suptitle(note, fontsize=6, color=GREY, x=0.01, ha="left")
     return figure, axes
 
 
 def _over_time(summary: Summary, comparison: Comparison, name: str, factor: float, label: str, note: str) -> Figure:
-    figure, axes = _grid(summary, note, 52, 26)
+    figure, axes = _grid(summary, note, 50, 24)
     for place, task in zip(axes, summary.tasks, strict=False):
         duration = comparison.of(task, 0).task.duration
         time = duration * np.array(summary.checkpoints)
@@ -93,21 +93,26 @@ def _over_time(summary: Summary, comparison: Comparison, name: str, factor: floa
             else:
                 place.vlines(time[there], low, high, color=_look(summary, method)["color"], lw=0.4)
         place.set(xscale="log", yscale="log", ylim=(0.95 * least, top))
-        place.yaxis.set_major_locator(LogLocator(subs=(1, 1.5, 2, 3, 5, 7)))
-        place.yaxis.set_minor_locator(NullLocator())
-        for axis in (place.xaxis, place.yaxis):
-            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        for axis, parts in ((place.xaxis, (1, 2, 5)), (place.yaxis, (1, 1.5, 2, 3, 5, 7))):
+            _plain_log(axis, parts)
     for place in axes[:: min(3, len(summary.tasks))]:
         place.set_ylabel(label)
     figure.supxlabel("the robot's time / s", fontsize=8)
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="lower center", ncols=5, bbox_to_anchor=(0.5, 0.03), handlelength=3.2)
+    figure.legend(handles, labels, loc="outside lower center", ncols=5, handlelength=3.2)
     return figure
+
+
+def _plain_log(axis: Axis, parts: tuple[float, ...]) -> None:
+    """Numbers without exponents at these parts of each decade."""
+    axis.set_major_locator(LogLocator(subs=parts))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def _methods(summary: Summary, note: str) -> Figure:
     """J of each method at the last checkpoint, as a multiple of the first method's: a row each, a panel a task."""
-    figure, axes = _grid(summary, note, 6 + 3.6 * len(summary.methods), 12)
+    figure, axes = _grid(summary, note, 6 + 3.6 * len(summary.methods), 8)
     rows = np.arange(len(summary.methods))[::-1]
     columns = min(3, len(summary.tasks))
     for i, (place, task) in enumerate(zip(axes, summary.tasks, strict=False)):
@@ -128,9 +133,7 @@ def _methods(summary: Summary, note: str) -> Figure:
             place.plot(middle, row, look["marker"], color=look["color"], ms=4)
         place.axvline(1.0, color=GREY, lw=0.6, ls=":")
         place.set(xscale="log", xlim=(0.7, _HIGHEST), ylim=(-0.7, len(rows) - 0.3))
-        place.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7)))
-        place.xaxis.set_minor_locator(NullLocator())
-        place.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        _plain_log(place.xaxis, (1, 2, 3, 5))
     figure.supxlabel(
         f"J after {summary.checkpoints[-1]} episodes' worth of time, as a multiple of that of {summary.methods[0]}",
         fontsize=8,
@@ -157,7 +160,7 @@ def _paths(summary: Summary, comparison: Comparison, factor: float, unit: str, n
     for place in axes[:: min(3, len(summary.tasks))]:
         place.set_ylabel(f"z / {unit}")
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="lower center", ncols=4, bbox_to_anchor=(0.5, 0.03), handlelength=3.2)
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, handlelength=3.2)
     return figure
 
 
@@ -192,9 +195,9 @@ def _elsewhere(summary: Summary, task: str, note: str) -> Figure:
     place.set_yticks(range(len(methods)), methods)
     place.tick_params(length=0)
     place.set_title(
-        f"{task}: J on robots that it was not tuned for; darker is more, as a multiple of J on its own", loc="left"
+        f"{task}: J on robots that it was not made for; the darker, the more times J on its own", loc="left"
     )
     for side in place.spines.values():
         side.set_visible(False)
-    figure.supxlabel(note, fontsize=6, color=GREY)
+    figure.suptitle(note, fontsize=6, color=GREY, x=0.01, ha="left")
     return figure

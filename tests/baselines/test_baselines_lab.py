@@ -1,0 +1,95 @@
+"""All methods are lent the same robot for the same time, and what a campaign does is one of them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from baselines_support import SYSTEM, THETA, LinearPlant, study
+
+from socasadi.baselines import BudgetSpent, Identified, Lab, Method, ModelSearch, static_gain
+from socasadi.campaign import Pilot
+
+
+def test_every_experiment_is_paid_by_the_second_and_none_is_begun_that_cannot_be():
+    lab = Lab(study(), (12.0, 30.0))
+    controller = lab.study.mpc.controller(THETA)
+    lab.probe(5.0)
+    lab.fly(controller)
+    assert lab.spent == pytest.approx(11.0)
+    assert lab.due  # a flight of 6 s passes the checkpoint at 12 s
+    lab.fly(controller)
+    assert lab.spent == pytest.approx(17.0)
+    assert not lab.due
+    cut = lab.fly(controller, give_up=1e-3)
+    assert cut.cut is not None
+    assert lab.spent == pytest.approx(17.0 + len(cut.tension) * 0.05)
+    with pytest.raises(BudgetSpent, match="14 s are needed"):
+        lab.probe(14.0)
+    assert (lab.flights, lab.probes, lab.failed) == (3, 1, 0)
+
+
+def test_what_breaks_off_costs_what_it_flew_and_counts_as_failed():
+    class Fragile(LinearPlant):
+        def step(self, tension, tip_force=None):
+            if np.abs(tension).max() > 3:
+                raise RuntimeError("a cable tore")
+            return super().step(tension)
+
+    lab = Lab(study(Fragile()), (60.0,))
+    episode = lab.fly(lab.study.mpc.controller(THETA))
+    assert lab.cost(episode) is None
+    assert lab.failed == 1
+    assert lab.spent < 1.0
+
+
+def test_the_search_of_a_model_is_the_campaign_itself(tmp_path):
+    """The same points, flown under the same noise, cut at the same sample, as Study.run has them."""
+    made = study(LinearPlant(noise=1e-3))
+    result = made.run(tmp_path / "run", progress=None)
+    lab, costs = Lab(made, (8 * 6.0,)), []
+    fly = lab.fly
+
+    def watched(pilot, **given):
+        episode = fly(pilot, **given)
+        costs.append(lab.cost(episode))
+        return episode
+
+    lab.fly = watched
+    offers = []
+    with pytest.raises(BudgetSpent):
+        offers.extend(ModelSearch().offers(lab))
+    assert costs[: len(result.trials)] == [trial.J for trial in result.trials]
+
+
+@pytest.mark.parametrize("kind", ["bayesian", "sobol", "random"])
+def test_a_search_offers_its_best_at_every_checkpoint(kind):
+    lab, offered = Lab(study(LinearPlant(noise=1e-3)), (12.0, 48.0)), []
+    with pytest.raises(BudgetSpent):
+        offered.extend((lab.spent, pilot) for pilot in ModelSearch(kind).offers(lab))
+    early, late = offered[0], offered[-1]
+    assert early[0] <= 12.0 < late[0] <= 48.0
+    costs = [lab.cost(Lab(lab.study, (1e3,)).fly(pilot, number=99)) for _, pilot in (early, late)]
+    assert costs[1] <= 1.02 * costs[0]
+
+
+def test_the_identified_model_is_the_robots_own():
+    (pilot,) = Identified(20.0).offers(Lab(study(), (20.0,)))
+    n = len(SYSTEM.A)
+    gain = static_gain(SYSTEM)
+    design = pilot.design
+    found = design.C[:, :n] @ np.linalg.solve(np.eye(n) - design.A[:n, :n], design.B[:n]) / pilot.mpc.input_scale
+    np.testing.assert_allclose(found, gain, atol=1e-4 * np.abs(gain).max())
+
+
+def test_a_method_of_ones_own_is_a_few_lines():
+    @dataclass(frozen=True)
+    class Sleepy(Method):
+        def offers(self, lab: Lab) -> Iterator[Pilot]:
+            yield lab.study.mpc.controller(THETA)
+
+    (pilot,) = Sleepy().offers(Lab(study(), (6.0,)))
+    assert pilot.mpc == study().mpc
+    assert Sleepy().information == "data sheet"
+    with pytest.raises(TypeError, match="abstract"):
+        replace(Method())

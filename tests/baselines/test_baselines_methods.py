@@ -1,0 +1,193 @@
+"""Each method against what is known of it from elsewhere."""
+
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from baselines_support import SYSTEM, LinearPlant, rod_study, study
+
+from socasadi import SetPoints
+from socasadi.baselines import (
+    PID,
+    BudgetSpent,
+    DeePC,
+    HInfinity,
+    IterativeLearning,
+    Koopman,
+    Lab,
+    Linearised,
+    NonlinearMPC,
+    Subspace,
+    Weights,
+    _deepc,
+    _koopman,
+    worth,
+)
+from socasadi.baselines._nonlinear import _advance
+from socasadi.baselines._robust import _most_robust
+from socasadi.baselines._subspace import n4sid
+from socasadi.campaign import probe
+from socasadi.codegen import c_compiler
+from socasadi.model import StateSpace
+
+compiled = pytest.mark.skipif(c_compiler() is None, reason="its program is solved in C")
+
+
+def last_offer(method, lab):
+    offered = []
+    with suppress(BudgetSpent):
+        offered.extend(method.offers(lab))
+    return offered[-1]
+
+
+FEW = {
+    "weights": (Weights(probing=6.0), 1.2),
+    "PID": (PID(probing=6.0), 4.0),
+    "H-infinity": (HInfinity(probing=6.0), 4.0),
+    "N4SID": (Subspace(probing=12.0), 1.1),
+    "ILC": (IterativeLearning(probing=6.0), 1.1),
+    "Koopman": pytest.param(Koopman(probing=12.0), 3.0, marks=compiled),
+    "DeePC": pytest.param(DeePC(probing=12.0), 2.0, marks=compiled),
+    "velocity DeePC": pytest.param(DeePC(velocity=True, probing=12.0), 3.0, marks=compiled),
+}
+
+
+@pytest.mark.parametrize(("method", "times"), FEW.values(), ids=FEW)
+def test_a_minute_with_the_arm_gives_a_controller_that_follows_the_circle(method, times):
+    """J within a factor of that of the MPC on the arm's own linearisation; not to move costs 300 times as much."""
+    made = rod_study()
+    (best,) = Linearised().offers(Lab(made, (60.0,)))
+    pilot = last_offer(method, Lab(made, (60.0,)))
+    flown, path = worth(made, pilot, 1)
+    assert flown.J[0] < times * worth(made, best, 1)[0].J[0]
+    assert flown.failed == flown.fallbacks == 0
+    assert path.shape == (121, 2)
+
+
+@pytest.mark.parametrize("method", [PID(10.0), HInfinity(10.0)])
+def test_integral_action_leaves_no_steady_error(method):
+    made = study(LinearPlant())
+    lab = Lab(made, (64.0,))
+    pilot = last_offer(method, lab)
+    plant, wanted = LinearPlant(), np.array([[0.02, -0.01]])
+    pilot.reset(0.0)
+    y = plant.reset()
+    for _ in range(2000):
+        y = plant.step(pilot.step(y, wanted))
+    np.testing.assert_allclose(y, wanted[0], atol=1e-4)  # an integrator of the loop shaping is one above 1e-3 rad/s
+
+
+def test_the_most_robust_controller_of_an_integrator_is_minus_one():
+    """Of G = 1/s the largest robustness is 1/sqrt(2), reached by K = -1 (Glover and McFarlane 1989)."""
+    one, zero = np.ones((1, 1)), np.zeros((1, 1))
+    K = _most_robust(StateSpace(zero, one, one, zero))
+    static = K.D - K.C @ np.linalg.solve(K.A, K.B)
+    assert static == pytest.approx(-1.0, rel=0.25)  # gamma is 1.1 times the least
+    margins = []
+    for w in np.logspace(-3, 3, 400):
+        G, k = 1 / (1j * w), (K.C @ np.linalg.inv(1j * w * np.eye(1) - K.A) @ K.B + K.D).item()
+        S = 1 / (1 - G * k)
+        margins.append(np.linalg.norm(np.array([[k * S, k * S * G], [S, S * G]]), 2))
+    assert max(margins) <= 1.1 * np.sqrt(2) * (1 + 1e-6)
+
+
+@compiled
+def test_without_noise_and_regularisation_deepc_is_the_mpc_on_the_true_model():
+    """The equivalence of Coulson, Lygeros, Dörfler 2019: the plan of the data is that of the model."""
+    made = study(output_bounds=None)
+    record = probe(LinearPlant(), (-10, 10), duration=20.0)
+    deepc = _deepc._Controller(DeePC(past=6, horizon=8), made.mpc, record, np.array([1e-9, 1e9]))
+    plant, rng = LinearPlant(), np.random.default_rng(0)
+    y = plant.reset()
+    deepc.reset(0.0)
+    wanted = np.tile([0.01, 0.005], (8, 1))
+    for _ in range(8):
+        deepc.step(y, wanted)
+        deepc.held = rng.uniform(-5, 5, 3)
+        y = plant.step(deepc.held)
+    u = deepc.step(y, wanted)
+    # The same by least squares on the true model: sum Q |y - r|^2 + |change of u / 10|^2, no bound active.
+    rows, free, x = [], [], plant.x
+    response = [SYSTEM.C @ np.linalg.matrix_power(SYSTEM.A, k) for k in range(9)]
+    for k in range(8):
+        row = np.hstack([response[k - j] @ SYSTEM.B * 10 if j <= k else np.zeros((2, 3)) for j in range(8)])
+        rows.append(np.sqrt(1e3) * row)
+        free.append(np.sqrt(1e3) * (wanted[k] - response[k + 1] @ x))
+    change = np.eye(24) - np.eye(24, k=-3)
+    before = np.concatenate([plant.tension / 10, np.zeros(21)])
+    plan = np.linalg.lstsq(np.vstack([*rows, change]), np.concatenate([*free, before]), rcond=None)[0]
+    np.testing.assert_allclose(u, np.clip(10 * plan[:3], -10, 10), atol=1e-3)
+
+
+@compiled
+def test_a_lifting_without_monomials_predicts_a_linear_robot_exactly():
+    made = study()
+    pilot = _koopman._Controller(Koopman(delays=2, degree=1), made.mpc, probe(LinearPlant(), (-10, 10)), 1e-12, 1.0)
+    plant, errors = LinearPlant(), []
+    y = plant.reset()
+    pilot.reset(0.0)
+    for t in range(40):
+        u = pilot.step(y, np.tile([0.02 * np.sin(0.2 * t), 0.01], (10, 1)))
+        y = plant.step(u)
+        errors.append(np.abs(pilot._expected - y).max())
+    assert max(errors[3:]) < 1e-6
+
+
+def test_n4sid_finds_the_response_of_the_robot():
+    found = n4sid(probe(LinearPlant(), (-10, 10), duration=20.0), 4)
+    for k in range(30):
+        theirs, true = (m.C @ np.linalg.matrix_power(m.A, k) @ m.B + (m.D if k == 0 else 0) for m in (found, SYSTEM))
+        np.testing.assert_allclose(theirs, true, atol=1e-6)
+
+
+def test_learning_from_flight_to_flight_lowers_the_cost_where_nothing_else_changes():
+    """Without noise, on a circle that the loop cannot foresee well: each flight costs no more than the one before."""
+    made = study(LinearPlant(), preview=1)
+    lab, costs = Lab(made, (120.0,)), []
+    fly = lab.fly
+
+    def watched(pilot, **given):
+        episode = fly(pilot, **given)
+        costs.append(lab.cost(episode))
+        return episode
+
+    lab.fly = watched
+    last_offer(IterativeLearning(probing=10.0, caution=0.1), lab)
+    assert np.all(np.diff(costs[:8]) < 1e-3 * costs[0])
+    assert costs[7] < 0.9 * costs[0]
+
+
+def test_the_difference_quotients_are_the_derivatives_of_the_rods_step():
+    made = rod_study()
+    plant = made.plant
+    n = 2 * plant.rod.dof
+    rng = np.random.default_rng(0)
+    x, u = np.concatenate([0.3 * rng.standard_normal(n // 2), rng.standard_normal(n // 2)]), rng.uniform(-5, 5, 3)
+    x[n // 4 :] *= 0.05
+    after, slopes, y, C = (value.full() for value in _advance(plant, 3)(x, u))
+    step = plant.rod.step_expression(plant.sample_time, plant.sample_time / 4)
+    exact = step.jacobian()(x, u, np.zeros(3), after)
+    exact = np.hstack([exact[0].full(), exact[1].full()])
+    np.testing.assert_allclose(slopes, exact, atol=2e-4 * np.abs(exact).max())
+    np.testing.assert_allclose(y, plant.sensor(after).full())
+    assert C.shape == (2, n)
+
+
+@compiled
+def test_near_rest_the_nonlinear_mpc_does_what_the_one_on_the_linearisation_does():
+    made = rod_study()
+    small = Lab(study(made.plant, preview=10), (60.0,))
+    (nonlinear,), (linear,) = (list(method.offers(small)) for method in (NonlinearMPC(), Linearised()))
+    assert nonlinear.mpc == linear.mpc
+    task = SetPoints(points=((0.004, -0.002),), duration=4.0)
+    flown = [worth(replace(made, task=task), pilot, 1)[0] for pilot in (nonlinear, linear)]
+    assert flown[0].J[0] == pytest.approx(flown[1].J[0], rel=0.1)
+    assert flown[0].settled < 1.5e-3
+
+
+def test_what_needs_a_rod_says_so():
+    for method in (NonlinearMPC(), Linearised()):
+        assert method.information == "plant model"
+        with pytest.raises(TypeError, match="simulated rod"):
+            next(method.offers(Lab(study(), (60.0,))))
