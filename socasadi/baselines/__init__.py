@@ -4,7 +4,7 @@ A method is a :class:`Method`: it spends the time of a :class:`Lab` and offers c
 experiment costs is the same for all: see there.
 """
 
-from ._compare import Comparison, Size, load_comparison, run_comparison, stored_cells
+from ._compare import Comparison, Size, fly_cell, load_comparison, run_comparison, stored_cells
 from ._deepc import DeePC
 from ._fixed import Identified, Linearised
 from ._judge import Elsewhere, Worth, worth, worth_elsewhere
@@ -54,6 +54,7 @@ __all__ = [
     "Summary",
     "Weights",
     "Worth",
+    "fly_cell",
     "identified",
     "load_comparison",
     "looked_ahead",

@@ -83,7 +83,8 @@ def worth(study: Study, pilot: Pilot, flights: int) -> tuple[Worth, np.ndarray]:
 def open_loop_error(study: Study, pilot: Pilot) -> float:
     """How far the prediction model in a controller is off on a probing record that no method has seen, m.
 
-    Root mean square distance over the record, without any correction; NaN of a controller without a linear model.
+    Root mean square distance over the record, without any correction; NaN of a controller without a linear model, and
+    where the robot does not bear to be probed.
     """
     if not isinstance(pilot, Controller) or pilot.mpc.delay or pilot.mpc.measured_disturbances:
         return np.nan
@@ -91,7 +92,11 @@ def open_loop_error(study: Study, pilot: Pilot) -> float:
     n = design.order - design.outputs  # without the disturbances behind the model's own states
     model = StateSpace(design.A[:n, :n], design.B[:n] / scale, design.C[:, :n], design.D / scale)
     seed = int(np.random.SeedSequence([study.seed, _VERIFICATION, 0]).generate_state(1)[0])
-    return state_space_error(model, probe(study.plant, study.mpc.input_bounds, seed=seed))
+    try:
+        record = probe(study.plant, study.mpc.input_bounds, seed=seed)
+    except Exception:  # whatever a plant raises
+        return np.nan
+    return state_space_error(model, record)
 
 
 def worth_elsewhere(study: Study, pilot: Pilot, flights: int, others: Elsewhere) -> dict[str, Worth]:

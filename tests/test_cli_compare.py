@@ -1,0 +1,70 @@
+"""`socasadi compare` as a user meets it."""
+
+import csv
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from socasadi.codegen import c_compiler
+
+ROOT = Path(__file__).parents[1]
+
+
+def compare(*arguments, cwd):
+    command = [sys.executable, "-m", "socasadi.cli", "compare", *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ)
+
+
+@pytest.fixture(scope="module")
+def smoke(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("compare")
+    return folder, compare(ROOT / "studies" / "compare.py", "--smoke", "--jobs", "1", cwd=folder)
+
+
+pytestmark = pytest.mark.skipif(c_compiler() is None, reason="some methods are solved in C")
+
+
+def test_every_method_brings_a_controller_in_the_smoke_comparison(smoke):
+    folder, done = smoke
+    assert done.returncode == 0, done.stderr
+    with (folder / "runs" / "compare-smoke" / "table.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len({row["method"] for row in rows}) >= 15
+    assert {row["task"] for row in rows} == {"circle", "origin"}
+    assert all(float(row["J"]) < 60 for row in rows)
+    assert all(row["failed"].startswith("0 of") for row in rows)
+    assert "[1/" in done.stdout
+    assert "left" in done.stdout
+
+
+def test_its_figures_say_which_size_they_are_of(smoke):
+    folder, _ = smoke
+    figures = folder / "runs" / "compare-smoke" / "figures"
+    assert {file.stem for file in figures.glob("*.png")} == {"cost", "rmse", "methods", "paths", "elsewhere"}
+    assert all(file.stat().st_size > 5000 for file in figures.glob("*.png"))
+
+
+def test_given_again_it_flies_nothing_and_tells_the_same(smoke):
+    folder, done = smoke
+    again = compare(ROOT / "studies" / "compare.py", "--smoke", cwd=folder)
+    assert "[1/" not in again.stdout
+    assert again.stdout.splitlines()[-30:] == done.stdout.splitlines()[-30:]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (("nowhere.py",), "there is no study script nowhere.py"),
+        ((ROOT / "studies" / "circle.py",), "defines no `comparison`"),
+        ((ROOT / "studies" / "compare.py", "--smoke", "--quick"), "give one"),
+        ((ROOT / "studies" / "compare.py", "--jobs", "0"), "--jobs is at least 1"),
+    ],
+)
+def test_a_slip_is_answered_in_a_sentence(tmp_path, arguments, fault):
+    done = compare(*arguments, cwd=tmp_path)
+    assert done.returncode == 1
+    assert fault in done.stderr
+    assert "Traceback" not in done.stderr
