@@ -112,11 +112,11 @@ def _again(script: Path, options: list[tuple[str, Any]]) -> str:
 def _best_theta(study: Study, folder: Path) -> np.ndarray:
     """The theta that an earlier run found, if this study's model has the same entries."""
     result = Result.open(folder)
-    here, there = ([f"{entry.name} {entry.unit}" for entry in of.mpc.model.entries] for of in (study, result.study))
+    here, there = ([f"{entry.name} {entry.unit}" for entry in of.mpc.entries] for of in (study, result.study))
     if here != there:
         raise RunError(f"{folder} cannot be a start: its theta is {', '.join(there)}; this study's {', '.join(here)}")
     theta = result.chosen.theta
-    for entry, value in zip(study.mpc.model.entries, theta, strict=True):
+    for entry, value in zip(study.mpc.entries, theta, strict=True):
         if not entry.lower <= value <= entry.upper:
             raise RunError(
                 f"{folder} cannot be a start: its {entry.name} is {value:.5g} {entry.unit}, outside this study's "

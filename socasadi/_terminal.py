@@ -70,7 +70,8 @@ def starting_from(study: Study, record: Path | None) -> Study:
     """The study with the theta within its bounds that fits a probing record best as its first point."""
     if record is None:
         return study
-    return replace(study, initial=(identify(study.mpc.model, read_probe(record, study)), *study.initial))
+    found = identify(study.mpc.model, read_probe(record, study))
+    return replace(study, initial=(study.mpc.whole(found), *study.initial))
 
 
 def table(rows: Sequence[Mapping[str, str]], left: tuple[str, ...] = (), title: str = "") -> Table:
@@ -91,7 +92,7 @@ def distance(study: Study) -> tuple[float, str]:
 def print_theta(study: Study, trial: Asked, title: str) -> None:
     """The entries of a theta by name, with their bounds."""
     listed = Table(box=None, show_header=False, title=title, title_justify="left", title_style="")
-    entries = study.mpc.model.entries
+    entries = study.mpc.entries
     for entry, value, note in zip(entries, trial.theta, bound_notes(entries, trial.theta), strict=True):
         listed.add_row(f"  {entry.name}", f"{value:.5g}", entry.unit, f"[{entry.lower:g}, {entry.upper:g}]", note)
     out.print(listed)

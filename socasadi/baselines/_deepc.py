@@ -58,7 +58,7 @@ class _Controller(Law):
             u, y = np.diff(u, axis=0), np.diff(y, axis=0)
         # With g = Q h, where Q spans the rows of the matrices, nothing grows with the length of the record.
         matrices = np.vstack([_hankel(u, past + N), _hankel(y, past + N)])
-        reduced = np.linalg.qr(matrices.T, mode="r").T
+        reduced = np.asarray(np.linalg.qr(matrices.T, mode="r")).T
         split = np.cumsum([past * m, N * m, past * p])
         Up, Uf, Yp, Yf = np.split(reduced, split)
         names = {"u": past * m, "y": past * p, "reference": N * p, "before": m, "now": p}

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -119,8 +118,8 @@ class _Timed:
     def reset(self, u_prev: ArrayLike = 0.0) -> None:
         self._pilot.reset(u_prev)
 
-    def step(self, *given: Any) -> np.ndarray:
+    def step(self, y: ArrayLike, reference: ArrayLike, disturbance: ArrayLike | None = None) -> np.ndarray:
         start = time.perf_counter()
-        u = self._pilot.step(*given)
+        u = self._pilot.step(y, reference, disturbance)
         self.seconds.append(time.perf_counter() - start)
         return u

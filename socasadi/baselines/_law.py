@@ -116,10 +116,9 @@ class Program:
             upper.append(np.tile(mpc.output_limits[1] / unit, horizon))
             slack = np.broadcast_to(np.asarray(mpc.slack_weight, dtype=float), mpc.outputs)
             quadratic.append(np.tile(2 * slack * unit**2, horizon))
-        bounds = (np.concatenate(part) for part in (lower, upper, quadratic))
-        a, b = np.vstack(rows), np.vstack(free)
+        a, b, least, most, softness = (*map(np.vstack, (rows, free)), *map(np.concatenate, (lower, upper, quadratic)))
         self._scale, self._shape = mpc.input_scale, (horizon, m)
-        self._solver = ActiveSet(dual_program(hessian, gradient, a, b, *bounds, np.zeros(len(a))))
+        self._solver = ActiveSet(dual_program(hessian, gradient, a, b, least, most, softness, np.zeros(len(a))))
 
     def forget(self) -> None:
         """Start the next solution from nothing."""

@@ -5,6 +5,7 @@ from importlib import import_module
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..campaign import Pilot, Study
 from ..model import Entry, StateSpace, identify
@@ -39,7 +40,7 @@ class Method(ABC):
         """
 
 
-def search_for(kind: str, space: Space, study: Study, initial: Sequence[np.ndarray] = ()) -> Search:
+def search_for(kind: str, space: Space, study: Study, initial: Sequence[ArrayLike] = ()) -> Search:
     """A fresh search by name, seeded as a campaign of the study."""
     match kind:
         case "bayesian":
@@ -57,7 +58,7 @@ def tuned(
     build: Callable[[np.ndarray], Pilot],
     *,
     kind: str = "bayesian",
-    initial: Sequence[np.ndarray] = (),
+    initial: Sequence[ArrayLike] = (),
 ) -> Iterator[Pilot]:
     """Fly what ``build`` makes of the knobs' values, and look for the best until the time is spent.
 

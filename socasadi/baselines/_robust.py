@@ -1,5 +1,6 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_continuous_are
@@ -61,9 +62,7 @@ class _Controller(Law):
         robust = _most_robust(_series(plant, shaper))
         self._static = robust.D - robust.C @ np.linalg.solve(robust.A, robust.B)
         self._inverse, self._forward = inverse, forward
-        self._robust, self._shaper = (
-            StateSpace(*cont2discrete(tuple(system), mpc.sample_time, "bilinear")[:4]) for system in (robust, shaper)
-        )
+        self._robust, self._shaper = _sampled(robust, mpc.sample_time), _sampled(shaper, mpc.sample_time)
         self._sizes = len(robust.A), p
         self.begin()
 
@@ -91,6 +90,11 @@ def _in_tustins_variable(model: StateSpace, inverse: np.ndarray, time: float) ->
     plus = np.linalg.inv(A + np.eye(len(A)))
     root = 2 / np.sqrt(time)
     return StateSpace(2 / time * plus @ (A - np.eye(len(A))), root * plus @ B, root * C @ plus, D - C @ plus @ B)
+
+
+def _sampled(system: StateSpace, time: float) -> StateSpace:
+    matrices: Any = cont2discrete(tuple(system), time, "bilinear")
+    return StateSpace(*matrices[:4])
 
 
 def _series(after: StateSpace, before: StateSpace) -> StateSpace:

@@ -21,4 +21,4 @@ class ModelSearch(Method):
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         mpc = lab.study.mpc
-        return tuned(lab, mpc.model.entries, mpc.controller, kind=self.kind)
+        return tuned(lab, mpc.entries, mpc.controller, kind=self.kind)

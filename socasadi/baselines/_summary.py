@@ -68,7 +68,7 @@ class Summary:
                     ratios.append(np.clip(np.log(a) - np.log(b), -50, 50))
         if len(ratios) < 6 or not np.any(ratios):
             return won, len(tasks), np.nan
-        return won, len(tasks), float(wilcoxon(ratios).pvalue)
+        return won, len(tasks), float(wilcoxon(ratios)[1])  # pyright: ignore[reportArgumentType]
 
     def elsewhere(self, task: str) -> tuple[list[str], dict[str, np.ndarray]]:
         """Names of other robots, and by method J there (robots,), medians over flights and seeds; infinite: failed."""

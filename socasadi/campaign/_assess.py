@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model import identify, prediction_error
+from ..model import identify, state_space_error
 from ..mpc import DesignError
 from ..plant import ExternalPlant
 from ._result import Result
@@ -110,7 +110,7 @@ def assess(
             notify("probing the plant")
             fitted, judged = (_probing(result, journal, index) for index in (1, 2))
             notify("identifying a model")
-            thetas["identified"] = identify(study.mpc.model, fitted.record)
+            thetas["identified"] = study.mpc.whole(identify(study.mpc.model, fitted.record))
         except Exception as error:  # as in a trial: whatever the plant raises, the run goes on
             unidentified = f"{type(error).__name__}: {error}"
         verdicts = {}
@@ -151,7 +151,7 @@ def _verdict(study: Study, theta: np.ndarray, flights: Sequence[Flight | None], 
         rmse=np.array([score.rmse for score in scores]),
         failed=len(flights) - len(scores),
         broken=sum(np.isinf(flown_cost(flight, study)) for flight in flown),
-        prediction_error=prediction_error(study.mpc.model, theta, judged.record) if judged else np.nan,
+        prediction_error=state_space_error(study.mpc.system(theta), judged.record) if judged else np.nan,
     )
 
 

@@ -77,7 +77,7 @@ class Bench:
     def prepare(self) -> None:
         """Write the C that no trial changes, if a model in the middle of the box gives a controller."""
         (self.folder / _SETTINGS).write_text(json.dumps({"real": self.real}) + "\n")
-        entries = self.study.mpc.model.entries
+        entries = self.study.mpc.entries
         # Off the middle, where gains that may have either sign are 0 and nothing can be controlled.
         middle = [
             np.sqrt(e.lower * e.upper) if e.scale == "log" else e.lower + 0.6 * (e.upper - e.lower) for e in entries
@@ -97,8 +97,7 @@ class Bench:
         ExportError
             Single precision does not do for its controller, or cannot be tried.
         """
-        mpc = self.study.mpc
-        system = mpc.model.state_space(asked.theta, mpc.sample_time)
+        mpc, system = self.study.mpc.at(asked.theta), self.study.mpc.system(asked.theta)
         if self.real == "float":
             check_single_precision(ControllerRecord.simulated(mpc, system))
         told = (f"trial {asked.number} of {self.folder.name}, to be flown", *provenance(self.study, asked.theta))
@@ -113,7 +112,7 @@ class Bench:
 
     def about(self, asked: Asked) -> dict[str, Any]:
         """All of a trial that a program needs, as plain data."""
-        entries = self.study.mpc.model.entries
+        entries = self.study.mpc.entries
         return {
             "trial": asked.number,
             "phase": asked.phase,
@@ -129,7 +128,6 @@ class Bench:
         }
 
     def _write_sources(self, theta: np.ndarray) -> None:
-        mpc, task = self.study.mpc, self.study.task
+        mpc, task = self.study.mpc.at(theta), self.study.task
         instants = mpc.sample_time * np.arange(self.samples + 1 + mpc.reference_rows)
-        system = mpc.model.state_space(theta, mpc.sample_time)
-        export_sources(mpc, system, task.reference(instants), self.sources, real=self.real)
+        export_sources(mpc, self.study.mpc.system(theta), task.reference(instants), self.sources, real=self.real)

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 def provenance(study: "Study", theta: np.ndarray) -> tuple[str, ...]:
     """theta by name, and every setting of the study that says what the controller is for."""
     mpc = study.mpc
-    entries = zip(mpc.model.entries, theta, strict=True)
+    entries = zip(mpc.entries, theta, strict=True)
     return (
         f"prediction model {type(mpc.model).__name__}, theta:",
         *[f"    {entry.name} = {float(value)!r} {entry.unit.removesuffix('1')}".rstrip() for entry, value in entries],
-        *_told("MPC", mpc),
+        *_told("MPC", mpc.at(theta)),
         *_told("task", study.task),
         *_told("cost", study.cost),
         f"search {study.search}, seed {study.seed}",

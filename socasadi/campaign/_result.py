@@ -182,8 +182,8 @@ class Result:
 
         Where J was told alone, the controller is simulated on its own model instead.
         """
-        best, mpc = self.chosen, self.study.mpc
-        system = mpc.model.state_space(best.theta, mpc.sample_time)
+        best = self.chosen
+        mpc, system = self.study.mpc.at(best.theta), self.study.mpc.system(best.theta)
         if (episode := self._episode(best.number)) is None:
             return replace(ControllerRecord.simulated(mpc, system), provenance=self._provenance(best))
         samples = len(episode.tension)

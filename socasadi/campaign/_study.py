@@ -118,7 +118,7 @@ class Study:
         self._check_search()
 
     def _check_search(self) -> None:
-        space = Space(self.mpc.model.entries)
+        space = Space(self.mpc.entries)
         if len(self.initial) and self.search != "bayesian":
             raise ValueError(f"the search {self.search!r} has points of its own to start with: give no initial ones")
         if self.search == "paper" and (self.limits or self.conditions):
@@ -159,7 +159,7 @@ class Study:
 
     def optimizer(self) -> Search:
         """A fresh search, before any trial."""
-        space = Space(self.mpc.model.entries)
+        space = Space(self.mpc.entries)
         limits = {limit.name: limit.limit for limit in self.limits}
         fulfilled = admissible(self.conditions, self.mpc)
         match self.search:

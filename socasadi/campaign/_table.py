@@ -42,7 +42,7 @@ def trials_csv(result: Result) -> str:
 
 def _rows(result: Result) -> Iterator[dict[Any, Any]]:
     study, unit = result.study, Units.of(result.study.plant).output
-    entries, limits = study.mpc.model.entries, study.limits
+    entries, limits = study.mpc.entries, study.limits
     # What a user names may be called like what is here: keys of another kind keep them apart.
     headings = {
         **{name: name for name in ("trial", "phase", "outcome", "J", "literal")},

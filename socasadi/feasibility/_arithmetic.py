@@ -1,5 +1,7 @@
 """With the model that fits best: is the loop stable, what error is left, do solver and single precision do."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..codegen import c_compiler
@@ -16,10 +18,10 @@ _SAMPLES, _FALLBACKS = 500, 0.02
 
 def arithmetic(case: Case, theta: np.ndarray) -> list[Finding]:
     """Of the controller on the model of ``theta``: its loop around the robot, its solver, its single precision."""
-    mpc = case.study.mpc
+    mpc = replace(case.study.mpc, tuned=())
     try:
         controller = mpc.controller(theta)
-        record = ControllerRecord.simulated(mpc, mpc.model.state_space(theta, mpc.sample_time))
+        record = ControllerRecord.simulated(mpc, mpc.system(theta))
     except DesignError as error:
         says = f"the model that fits the robot best gives none: {error}"
         return [Finding("controller", "infeasible", says, "another family, or other weights")]

@@ -1,18 +1,19 @@
 import functools
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..codegen import c_compiler, warn_interpreted
-from ..model import PredictionModel, StateSpace
+from ..model import Entry, PredictionModel, StateSpace
 from ._check import check_settings
 from ._compiled import CompiledController
 from ._controller import Controller
 from ._interpreted import InterpretedController
 from ._tables import Real, check_real
+from ._tuned import factors, settled, tuned_entries
 from .formulation import (
     NUMBERS,
     SINGULAR,
@@ -105,6 +106,11 @@ class LinearMPC:
         Changes of the working set after which ``"active-set"`` gives up; it then tries once more from nothing, unless
         it has, before the clipped unconstrained law is applied. This bounds the time of a step. None: 50, and two more
         a constraint.
+    tuned
+        Settings that theta holds beside the model, each as a factor on what is given here: names among ``"Q"``,
+        ``"R"``, ``"rate_weight"``, ``"slack_weight"``, ``"measurement_noise"``, ``"input_noise"`` and
+        ``"disturbance_noise"``, searched from 0.01 to 100; or a mapping of names to the least and the largest factor.
+        Of the three kinds of noise only the quotients matter, and of Q and R.
 
     Raises
     ------
@@ -135,8 +141,10 @@ class LinearMPC:
     measured_disturbances: int = 0
     delay: int = 0
     iteration_limit: int | None = None
+    tuned: Any = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "tuned", tuned_entries(self.tuned))
         check_settings(self)
         for field in fields(self):
             if field.name != "model":
@@ -151,6 +159,51 @@ class LinearMPC:
     def outputs(self) -> int:
         """Number of outputs, p."""
         return self.model.axes
+
+    @functools.cached_property
+    def entries(self) -> tuple[Entry, ...]:
+        """The entries of theta: those of the prediction model, and a factor for each of ``tuned``."""
+        return (*self.model.entries, *factors(self))
+
+    @property
+    def size(self) -> int:
+        """Number of entries of theta."""
+        return len(self.entries)
+
+    def check(self, theta: ArrayLike) -> np.ndarray:
+        """``theta`` as floats (size,).
+
+        Raises
+        ------
+        ValueError
+            Its shape is another, an entry is not finite, or a factor is not positive.
+        """
+        values = np.asarray(theta, dtype=float)
+        if not self.tuned:
+            return self.model.check(values)
+        if values.shape != (self.size,):
+            raise ValueError(
+                f"theta has shape {values.shape}; this MPC takes ({self.size},): {self.model.size} of its "
+                f"{type(self.model).__name__} and {len(self.tuned)} factors"
+            )
+        self.model.check(values[: self.model.size])
+        for entry, value in zip(self.entries[self.model.size :], values[self.model.size :], strict=True):
+            if not 0 < value < np.inf:
+                raise ValueError(f"{entry.name} is a factor, not {value}")
+        return values
+
+    def at(self, theta: ArrayLike) -> "LinearMPC":
+        """The MPC with the settings of ``theta``, of which nothing but the model is left open."""
+        return settled(self, self.check(theta)[self.model.size :])
+
+    def system(self, theta: ArrayLike) -> StateSpace:
+        """The prediction model of ``theta``."""
+        return self.model.state_space(self.check(theta)[: self.model.size], self.sample_time)
+
+    def whole(self, theta: ArrayLike) -> np.ndarray:
+        """theta (size,) of the model's own (model.size,): the settings as they are here, or the nearest they may be."""
+        ones = [min(max(1.0, lower), upper) for _, lower, upper in self.tuned]
+        return np.concatenate([self.model.check(theta), ones])
 
     @property
     def blocks(self) -> tuple[int, ...]:
@@ -221,7 +274,7 @@ class LinearMPC:
         Parameters
         ----------
         theta
-            (model.size,).
+            (size,).
         real
             What it computes in, ``"double"`` or, of the back end ``"active-set"`` only, ``"float"``.
 
@@ -232,7 +285,7 @@ class LinearMPC:
         DesignError
             The model gives no controller, for instance because it cannot be observed.
         """
-        return self.controller_for(self.model.state_space(theta, self.sample_time), real=real)
+        return self.at(theta).controller_for(self.system(theta), real=real)
 
     def controller_for(self, system: StateSpace, *, real: Real = "double") -> Controller:
         """The controller on a given discrete-time model of any order, sampled as this MPC is.
@@ -292,7 +345,14 @@ class LinearMPC:
 
         Behind them comes the largest relative residual of the Riccati equations. It is differentiable in theta; the
         numbers are a controller's only where :meth:`controller` accepts theta.
+
+        Raises
+        ------
+        ValueError
+            Settings are ``tuned``: they are no symbols in it.
         """
+        if self.tuned:
+            raise ValueError("the formulation is one of the model alone: take that of mpc.at(theta)")
         return _formulation(self)
 
 

@@ -154,7 +154,8 @@ def _paths(summary: Summary, comparison: Comparison, factor: float, unit: str, n
         for method in shown:
             path = next((np.array(cell["path"]) for cell in summary.of_pair(task, method) if cell["path"]), None)
             if path is not None:
-                place.plot(*(factor * path.T), label=method, **_look(summary, method) | {"marker": ""})
+                look: dict[str, Any] = _look(summary, method) | {"marker": ""}
+                place.plot(*(factor * path.T), label=method, **look)
         place.set_aspect("equal", adjustable="datalim")
         place.set(xlabel=f"y / {unit}")
     for place in axes[:: min(3, len(summary.tasks))]:

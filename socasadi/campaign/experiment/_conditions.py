@@ -60,7 +60,8 @@ class ClosedLoopStability:
         return "closed_loop_stability"
 
     def margin(self, mpc: LinearMPC, theta: np.ndarray) -> float:
-        design = mpc.design(mpc.model.state_space(theta, mpc.sample_time))
+        mpc, system = mpc.at(theta), mpc.system(theta)
+        design = mpc.design(system)
         factors = self.gain_margin ** np.linspace(-1, 1, 5 if self.gain_margin > 1 else 1)
         return self.radius - max(loop_radius(mpc, design, factor) for factor in factors)
 
@@ -98,7 +99,7 @@ class IterationBound:
             raise ValueError(f"IterationBound counts iterations of the back end 'active-set', not of {mpc.backend!r}")
 
     def margin(self, mpc: LinearMPC, theta: np.ndarray) -> float:
-        system = mpc.model.state_space(theta, mpc.sample_time)
+        mpc, system = mpc.at(theta), mpc.system(theta)
         record = ControllerRecord.simulated(mpc, system, samples=1)
         controller, worst = mpc.controller_for(system), 0
         if not isinstance(controller, CompiledController):

@@ -164,5 +164,5 @@ def _slices(pieces: Pieces) -> list[Data]:
             "high": found.high[i].tolist(),
             "likely": found.likely[i].tolist(),
         }
-        for i, entry in enumerate(study.mpc.model.entries)
+        for i, entry in enumerate(study.mpc.entries)
     ]

@@ -141,7 +141,7 @@ def _theta(pieces: Pieces) -> list[dict[str, str]]:
     if pieces.study is None or pieces.chosen is None:
         return []
     identified = pieces.verdicts.get("identified")
-    found, rows, entries = pieces.sensitivity, [], pieces.study.mpc.model.entries
+    found, rows, entries = pieces.sensitivity, [], pieces.study.mpc.entries
     notes = bound_notes(entries, pieces.chosen.theta)
     for i, entry in enumerate(entries):
         rows.append(
