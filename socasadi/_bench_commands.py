@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from ._terminal import (
+    Anyway,
     ProbeRecord,
     RunFolder,
     StudyFile,
@@ -51,13 +52,14 @@ def init(
         str | None, typer.Option(help="What the controller's C computes in: double (default) or float.")
     ] = None,
     record: ProbeRecord = None,
+    anyway: Anyway = False,
     resume: Annotated[bool, typer.Option("--resume", help="Change the iterations of a run that is there.")] = False,
 ) -> None:
     """Make a run whose trials are flown by hand or by another program: ask and tell bring them."""
     if real is not None:
         check_real(real)
         _check_compiler(real)
-    study = starting_from(load_study(script), record)
+    study = starting_from(load_study(script), record, anyway)
     changes = {"iterations": iterations, "seed": seed}
     study = replace(study, **{name: value for name, value in changes.items() if value is not None})
     folder = folder or Path("runs") / script.stem

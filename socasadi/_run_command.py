@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
 
 from ._terminal import (
+    Anyway,
     ProbeRecord,
     StudyFile,
     best_of,
@@ -54,18 +55,20 @@ def run(
         list[Path] | None, typer.Option(metavar="RUN", help="Earlier run whose best theta is tried first.")
     ] = None,
     record: ProbeRecord = None,
+    anyway: Anyway = False,
 ) -> None:
     """Run a study: search, Sobol baseline, verification, figures, and the controller in C."""
     if jobs is not None and jobs < 1:
         raise RunError(f"--jobs is at least 1, not {jobs}")
-    study = starting_from(load_study(script), record)
+    study = starting_from(load_study(script), record, anyway)
     given: dict[str, Any] = {"iterations": iterations, "seed": seed}
     if start:
         given["initial"] = (*(_best_theta(study, earlier) for earlier in start), *study.initial)
     study = replace(study, **{name: value for name, value in given.items() if value is not None})
     folder = folder or Path("runs") / script.stem
     out.print(f"{script}: {study.trials} trials of {study.task.duration:g} s, into {folder}")
-    against = check(study, quick=True).objections
+    checked = check(study, quick=True)
+    against = checked.objections
     out.print("check: what stands against it" if against else "check: nothing stands against it")
     print_check(against)
     began = time.monotonic()
@@ -80,6 +83,9 @@ def run(
         out.print(f"\nStopped. Every finished trial is stored; go on with: {_again(script, given_options)}")
         raise typer.Exit(130) from None
     out.print(f"\n{clock(time.monotonic() - began)} in all")
+    if checked.verdict == "infeasible":
+        named = ", ".join(finding.name for finding in against if finding.verdict == "infeasible")
+        out.print(f"the check before it called it infeasible ({named}): socasadi check {shlex.quote(str(script))}")
 
 
 def _run(study: Study, folder: Path, resume: bool, flown: dict[str, Any]) -> None:

@@ -29,7 +29,7 @@ from .campaign import (
 )
 from .campaign.store import compare_settings, journal_path, read_settings
 from .export import NotBuiltError, build_and_replay
-from .feasibility import Finding
+from .feasibility import Finding, check_record
 from .model import identify
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="Python file that defines `study`.")]
@@ -42,6 +42,8 @@ ProbeRecord = Annotated[
     Path | None,
     typer.Option("--record", metavar="FILE", help="Probing record (CSV): what fits it is tried first."),
 ]
+
+Anyway = Annotated[bool, typer.Option("--anyway", help="Start from the record whatever the check says of it.")]
 
 # A file or a pipe has no width; a table must not be folded for it.
 # Nothing is markup: what a robot says when it fails, or the name of a folder, may hold brackets.
@@ -66,11 +68,22 @@ def opened(folder: Path, script: Path | None) -> Result:
     return Result(study, folder)
 
 
-def starting_from(study: Study, record: Path | None) -> Study:
-    """The study with the theta within its bounds that fits a probing record best as its first point."""
+def starting_from(study: Study, record: Path | None, anyway: bool) -> Study:
+    """The study with the theta within its bounds that fits a probing record best as its first point.
+
+    Raises
+    ------
+    RunError
+        The record is not one of this study's robot, as far as can be seen; ``anyway`` takes it all the same.
+    """
     if record is None:
         return study
-    found = identify(study.mpc.model, read_probe(record, study))
+    probed = read_probe(record, study)
+    against = check_record(study, probed)
+    print_check(against.objections)
+    if against.verdict == "infeasible" and not anyway:
+        raise RunError(f"{record} is no record to start from, see above; --anyway takes it all the same")
+    found = identify(study.mpc.model, probed)
     return replace(study, initial=(study.mpc.whole(found), *study.initial))
 
 

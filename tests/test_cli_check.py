@@ -84,7 +84,7 @@ def test_a_real_robot_is_checked_by_its_record_and_its_data_sheet(socasadi, tmp_
     sheet = "length = 0.6\nbending_stiffness = 0.636\nmass_per_length = 2.83\ncable_offset = 0.02\n"
     (tmp_path / "arm.toml").write_text(sheet)
     done = socasadi("check", "arm.py", "--spec", "arm.toml", "--record", recorded, cwd=tmp_path)
-    assert "by what is known from the rod and the probing record" in done.stdout
+    assert "by what is known from the data sheet and the probing record" in done.stdout
     (tmp_path / "arm.py").write_text(EXTERNAL.format(radius=0.2))
     assert socasadi("check", "arm.py", "--spec", "arm.toml", cwd=tmp_path).returncode == 1
 
@@ -103,6 +103,23 @@ def test_a_slip_is_answered_in_a_sentence(socasadi, tmp_path, arguments, fault):
     assert done.returncode != 0
     assert fault in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_campaign_is_not_begun_from_a_record_in_another_unit(socasadi, tmp_path, recorded):
+    (tmp_path / "arm.py").write_text(EXTERNAL.format(radius=0.05))
+    lines = [line.split(",") for line in recorded.read_text().splitlines()]
+    heading = [name.split(" ")[0] for name in lines[0]]
+    rows = [
+        [str(1e3 * float(x)) if n[0] == "y" and x else x for n, x in zip(heading, row, strict=True)]
+        for row in lines[1:]
+    ]
+    (tmp_path / "mm.csv").write_text("\n".join(",".join(row) for row in [heading, *rows]))
+    refused = socasadi("init", "arm.py", "--record", "mm.csv", cwd=tmp_path)
+    assert refused.returncode == 1
+    assert "a record whose outputs are in m" in refused.stdout
+    assert "--anyway" in refused.stderr
+    assert not (tmp_path / "runs").exists()
+    assert socasadi("init", "arm.py", "--record", "mm.csv", "--anyway", cwd=tmp_path).returncode == 0
 
 
 def test_a_campaign_starts_from_what_fits_the_record(socasadi, tmp_path, recorded):

@@ -9,8 +9,8 @@ from ..rod import EquilibriumError
 from . import _arithmetic, _dynamics, _family, _statics
 from ._case import Case
 from ._finding import Check, Finding, Picture
-from ._known import known
-from ._units import units
+from ._known import RodRobot, known
+from ._record import family_of_record, mistakes, of_another_unit
 
 _ASKED = (
     _statics.gravity,
@@ -52,9 +52,12 @@ def check(
     if plant is None and isinstance(study.plant, SimulatedPlant):
         plant = study.plant
     _check_fit(study, plant, record)
-    if record is not None and (mistaken := units(study, record)):  # all else would be nonsense
+    if record is not None and (mistaken := of_another_unit(study, record)):  # all else would be nonsense
         return Check("the probing record", tuple(mistaken))
     robot, noise = known(study, plant, record)
+    rod = getattr(robot, "statics", robot)
+    if isinstance(rod, RodRobot) and (curled := _statics.curled(study, rod)):
+        return Check(rod.source, tuple(curled))
     if robot is None:
         says = "the bounds of theta do not even tell which way the inputs move it, and nothing else is known"
         advice = "a probing record (--record) or a data sheet (--spec), and check again"
@@ -69,7 +72,7 @@ def check(
         guessed = plant is None and record is None
         if not quick and stands and not guessed and not study.mpc.measured_disturbances:
             fits = _family.fits(case)
-            findings += _family.family(case, fits)
+            findings += _family.family(study, fits, [*mistakes(study, record)] if record is not None else ())
             if all(finding.verdict != "infeasible" for finding in findings):
                 findings += _arithmetic.arithmetic(case, fits[0].theta)
     except EquilibriumError as error:
@@ -77,6 +80,19 @@ def check(
     if plant is None and record is None:  # of a guess nothing is certain
         findings = [replace(f, verdict="doubtful") if f.verdict == "infeasible" else f for f in findings]
     return Check(robot.source, tuple(findings), _picture(case) if study.mpc.outputs == 2 else None)
+
+
+def check_record(study: Study, record: Record) -> Check:
+    """Whether a probing record is one of this study's robot: its units, and whether theta's family can stand for it.
+
+    Raises
+    ------
+    ValueError
+        It has other inputs, outputs or another sample time than the study.
+    """
+    _check_fit(study, None, record)
+    findings = of_another_unit(study, record) or family_of_record(study, record)
+    return Check("the probing record", tuple(findings))
 
 
 def _check_fit(study: Study, plant: SimulatedPlant | None, record: Record | None) -> None:

@@ -20,6 +20,8 @@ _HOPELESS = 1.5
 _SAMPLES_A_PERIOD = (4.0, 10.0)
 _LOUD = (0.2, 0.5)
 """Noise (standard deviation of a distance) as a share of what is asked for: doubtful, and infeasible, from there."""
+_THROWN = 0.5
+"""Share of an arm's length by which no pulse is meant to push its tip."""
 _SCATTER = 0.2
 """Standard deviation of J from flight to flight, as a share of J, from which on trials cannot be told apart."""
 
@@ -99,15 +101,20 @@ def pulse(case: Case) -> list[Finding]:
     still = plant.reset(tension_bounds=mpc.input_bounds)
     says = f"a pulse of {np.linalg.norm(given.force):.3g} N for {given.duration:g} s"
     try:
-        time = np.arange(0.0, given.duration + 1 / (frequency or 1.0), mpc.sample_time)
-        seen = [plant.step(plant.tension, given.at(given.time + t)) - still for t in time]
+        pushed = given.samples(mpc.sample_time, case.study.task.samples(mpc.sample_time))
+        after = round(1 / ((frequency or 1.0) * mpc.sample_time))
+        forces = [given.force] * pushed + [(0.0, 0.0, 0.0)] * after
+        seen = [plant.step(plant.tension, force) - still for force in forces]
     except PlantFailure as error:
         return [Finding("pulse", "infeasible", f"{says} throws the arm: {error.reason}", "a weaker or shorter pulse")]
-    pushed = float(np.linalg.norm(seen, axis=1).max())
-    says += f" pushes the outputs by {case.length(pushed)} if nothing answers it"
+    far = float(np.linalg.norm(seen, axis=1).max())
+    says += f" pushes the outputs by {case.length(far)} if nothing answers it"
+    if far > _THROWN * robot.rod.length and case.units.output == "m":
+        says += f", of an arm of {case.length(robot.rod.length)}"
+        return [Finding("pulse", "infeasible", says, "a weaker or shorter pulse")]
     limits = mpc.output_limits
     room = np.inf if limits is None else min((case.reference - limits[0]).min(), (limits[1] - case.reference).min())
-    if pushed <= room:
+    if far <= room:
         return [Finding("pulse", "ok", says)]
     says += f"; the reference keeps {case.length(max(room, 0.0))} away from the output bounds"
     return [Finding("pulse", "doubtful", says, "a weaker pulse, or wider output_bounds: they are soft, and will break")]

@@ -17,7 +17,7 @@ from ._robot import Pose, Robot
 def known(study: Study, plant: SimulatedPlant | None, record: Record | None) -> tuple[Robot | None, float | None]:
     """What is known of the robot, and the standard deviation of its sensor's noise."""
     mpc = study.mpc
-    rod = RodRobot(plant) if plant is not None else None
+    rod = None if plant is None else RodRobot(plant) if plant is study.plant else RodRobot(plant, "the data sheet")
     if record is not None:
         theta = identify(mpc.model, record, within_bounds=False)
         noise = _noise(record, prediction_error(mpc.model, theta, record))
@@ -50,14 +50,20 @@ def _noise(record: Record, error: float) -> float:
 class RodRobot:
     """A rod of which everything is known."""
 
-    source = "the rod"
-
-    def __init__(self, plant: SimulatedPlant) -> None:
-        self.plant, self.rod = plant, plant.rod.valued
+    def __init__(self, plant: SimulatedPlant, source: str = "the rod") -> None:
+        self.plant, self.rod, self.source = plant, plant.rod.valued, source
 
     @property
     def neutral(self) -> np.ndarray:
         return self.rod.neutral
+
+    @property
+    def mass(self) -> float:
+        """Of the rod without payloads, kg, by Simpson's rule in each division."""
+        return sum(
+            float(ca.DM(d.length / 6 * (d.inertia_at(0.0)[3] + 4 * d.inertia_at(0.5)[3] + d.inertia_at(1.0)[3])))
+            for d in self.rod.divisions
+        )
 
     def pose(self, given: np.ndarray, near: Pose | None = None) -> Pose:
         found = self.rod.equilibrium(given, near=near and near.equilibrium)

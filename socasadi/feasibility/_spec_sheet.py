@@ -26,6 +26,9 @@ _OPTIONAL: dict[str, Any] = {
     "gravity": [0.0, 0.0, 0.0],
     "noise": 1e-3,
 }
+_UNITS = _NEEDED | {"radius": "m", "cable_angles": "degrees", "gravity": "m/s2", "noise": "m"}
+_CLOSE = 10.0
+"""Degrees within which no arm has all of its cables."""
 
 
 class SpecSheetError(ValueError):
@@ -56,7 +59,8 @@ def read_spec_sheet(path: str | Path, sample_time: float) -> SimulatedPlant:
         raise SpecSheetError(f"{path} is a directory, not a data sheet") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise SpecSheetError(f"{path} is no TOML: {error}") from None
-    known = ", ".join([*(f"{name} ({unit})" for name, unit in _NEEDED.items()), *_OPTIONAL])
+    names = [*_NEEDED, *_OPTIONAL]
+    known = ", ".join(f"{name} ({_UNITS[name]})" if name in _UNITS else name for name in names)
     for name in given:
         if name not in _NEEDED and name not in _OPTIONAL:
             raise SpecSheetError(f"{path} has {name!r}, which no data sheet has here; there are {known}")
@@ -76,6 +80,10 @@ def read_spec_sheet(path: str | Path, sample_time: float) -> SimulatedPlant:
     angles = sheet["cable_angles"]
     if not (isinstance(angles, list) and angles and all(isinstance(angle, int | float) for angle in angles)):
         raise SpecSheetError(f"{path}: cable_angles is {angles!r}, but must be a list of degrees, one a cable")
+    if len(angles) > 1 and max(angles) - min(angles) < _CLOSE:
+        raise SpecSheetError(
+            f"{path}: cable_angles are {angles}, all within {max(angles) - min(angles):.3g} degrees: are they in rad?"
+        )
     try:
         return SimulatedPlant(_rod(sheet), sample_time, noise=sheet["noise"])
     except (ValueError, TypeError) as error:

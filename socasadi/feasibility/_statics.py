@@ -2,18 +2,41 @@
 
 import numpy as np
 
+from ..campaign import Study
 from ..rod import EquilibriumError
 from ._case import CLOSE, Case, percent
 from ._finding import Finding
+from ._known import RodRobot
 from ._reach import farthest, ray
 
 _ANOTHER_UNIT = 100.0
+_TURNS = 4.0
+"""Turns of the tip from which on nobody means it."""
 _TIGHT = 0.85
 """Share of the input bound from which on holding leaves too little to steer with."""
 _NOISE_MARGIN = 3.0
 _WEIGHT_MARGIN = 1.5
 _STRAIGHT = 1e-3
 """Share of the length by which the tip of a straight rod may be off the axis."""
+
+
+def curled(study: Study, robot: RodRobot) -> list[Finding]:
+    """Is it so soft that its inputs would roll it up? Then a number is in another unit, and all else takes ages."""
+    bounds = study.mpc.input_limits
+    if robot.plant.output_unit != "m":
+        return []
+    try:
+        rest = robot.pose(np.clip(robot.neutral, *bounds))
+    except EquilibriumError:
+        return []
+    # A constant curvature k moves the tip by k L^2 / 2 while that is small, and turns it by k L.
+    moved = float(np.linalg.norm(np.abs(rest.slope) @ np.max(np.abs(np.array(bounds) - rest.input), axis=0)))
+    turns = 2 * moved / robot.rod.length / (2 * np.pi)
+    if turns < _TURNS:
+        return []
+    says = f"the largest inputs would roll the arm up {turns:,.3g} times"
+    advice = "the unit of its stiffness (N m2, Pa), of its size (m), or of the inputs"
+    return [Finding("stiffness", "infeasible", says, advice)]
 
 
 def start(case: Case) -> list[Finding]:
@@ -40,6 +63,9 @@ def reach(case: Case) -> list[Finding]:
         f"the inputs can hold{around}"
     )
     advice = "a smaller reference, larger input_bounds, or cables farther from the axis of a softer or longer arm"
+    rest = case.rest.output
+    if np.linalg.norm(rest) > max(case.moved, CLOSE * case.size):  # how it is mounted moves it farther than its inputs
+        advice = f"a reference about where it rests, {case.lengths(rest)}, or gravity along the arm"
     if case.asked > _ANOTHER_UNIT * case.moved > 0:
         times = f"{case.asked / case.moved:,.0f}"
         advice = f"is the reference in {case.units.output}? It asks for {times} times what the arm can do"
@@ -112,7 +138,8 @@ def gravity(case: Case) -> list[Finding]:
         says = f"the arm buckles under its own weight and loads{stands}"
         return [Finding("gravity", "infeasible", says, "a stiffer, shorter or lighter arm, or one that hangs")]
     if not any(rod.gravity) and not rod.payloads and not rod.loads:
-        return [Finding("gravity", "ok", "neither weight nor loads in this model")]
+        says = f"neither weight nor loads in this model of {robot.mass:.2g} kg"
+        return [Finding("gravity", "ok", says, "gravity of the rod, if the real one hangs or stands")]
     told = "at rest it is straight" if straight else f"at rest its tip is {1e3 * off:.3g} mm off the axis"
     if times < _WEIGHT_MARGIN:
         says = f"{told}; it buckles at {times:.2f} times its weight and loads"

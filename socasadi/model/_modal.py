@@ -8,6 +8,9 @@ import casadi as ca
 from ._base import PredictionModel
 from ._entry import Entry
 
+_SLENDER = (1.0, 1000.0)
+"""Between which an arm's length over its cables' offset lies; beyond, one of the two is in another unit."""
+
 
 @dataclass(frozen=True)
 class Modal(PredictionModel):
@@ -72,6 +75,12 @@ class Modal(PredictionModel):
         for name, value in spec.items():
             if not (isinstance(value, Real) and math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} must be positive, not {value!r}")
+        slender = length / cable_offset
+        if not _SLENDER[0] <= slender <= _SLENDER[1]:
+            raise ValueError(
+                f"length is {length:g} m and cable_offset {cable_offset:g} m, a ratio of {slender:,.3g}, and no soft "
+                "arm is so made: are both in m?"
+            )
         if not (isinstance(damping_ratio, Sequence) and len(damping_ratio) == 2):
             raise ValueError(f"damping_ratio is a pair of bounds, not {damping_ratio!r}")
         if not (math.isfinite(margin) and margin > 1):

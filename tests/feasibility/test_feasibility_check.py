@@ -187,6 +187,20 @@ def test_a_lasting_push_bends_the_arm_to_twice_where_it_would_hold_it():
     assert told == pytest.approx((1 + np.exp(-np.pi * 0.08)) * static, rel=0.05)
 
 
+def test_a_pulse_is_as_long_as_the_samples_that_begin_in_it_and_touches_at_least_one():
+    def told(**pulse):
+        found = check(study(task=Circle(pulse=Pulse(force=(0.0, 0.2, 0.0), **pulse))), quick=True)
+        return next(f.says for f in found.findings if f.name == "pulse").split("pushes")[1]
+
+    assert told(time=5.0, duration=0.05) == told(time=5.02, duration=0.04)
+    for pulse in (Pulse(5.013, 0.02, (0, 1, 0)), Pulse(50.0, 1.0, (0, 1, 0))):
+        with pytest.raises(ValueError, match="pushes in no sample"):
+            study(task=Circle(pulse=pulse))
+    thrown = check(study(task=Circle(pulse=Pulse(5.0, 1.0, (0, 100, 0)))), quick=True)
+    assert thrown.objections[0].name == "pulse"
+    assert thrown.objections[0].verdict == "infeasible"
+
+
 def test_one_cable_reaches_along_a_line():
     one = study(
         rod=replace(PAPER, cables=cables_around(1, 0.02)), model=Modal(axes=2, inputs=1), task=Circle(radius=0.02)

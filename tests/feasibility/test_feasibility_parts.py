@@ -7,7 +7,7 @@ from scipy.optimize import lsq_linear
 
 from socasadi import Circle, Cost, ExternalPlant, LinearMPC, Modal, Origin, Rod, SimulatedPlant, Study
 from socasadi.campaign import RecordingError, fly, probe, read_probe
-from socasadi.feasibility import SpecSheetError, check, read_spec_sheet
+from socasadi.feasibility import SpecSheetError, check, check_record, read_spec_sheet
 from socasadi.feasibility._optimum import optimum
 from socasadi.feasibility._reach import ray
 from socasadi.model import Record, StateSpace, identify
@@ -92,6 +92,42 @@ def test_a_record_in_another_unit_is_told_as_that_and_as_nothing_else(part, fact
     assert f"whose {part} are in {'m' if part == 'outputs' else 'N'}" in finding.advice
 
 
+@pytest.mark.parametrize(
+    ("mistaken", "told"),
+    [
+        (lambda u, y: (u[:, [0, 2, 1]], y), "u1, u3, u2"),
+        (lambda u, y: (u[:, [1, 2, 0]], y), "u3, u1, u2"),
+        (lambda u, y: (-u, y), "sign of every input"),
+        (lambda u, y: (u, y + np.array([0.03, 0.0])), "counted from where it rests"),
+        (lambda u, y: (u[4:], y[:-4]), "4 samples late"),
+    ],
+)
+def test_what_people_get_wrong_in_a_record_is_named(mistaken, told):
+    record = probe(SimulatedPlant(Rod.preset("paper"), noise=1e-3), (-10, 10), seed=3)
+    u, y = mistaken(record.tension, record.output)
+    (finding,) = check_record(arm(), Record(record.sample_time, u, y)).findings
+    assert finding.verdict in ("doubtful", "infeasible")
+    assert told in finding.says
+    assert check_record(arm(), record).objections == ()
+
+
+def test_a_record_in_which_a_cable_stands_still_is_told_so():
+    record = probe(SimulatedPlant(Rod.preset("paper"), noise=1e-3), (-10, 10), seed=3, duration=5.0)
+    (finding,) = check_record(arm(), Record(0.05, record.tension * [1, 1, 0], record.output)).findings
+    assert "vary in 2 independent ways" in finding.says
+
+
+def test_an_arm_that_its_cables_would_roll_up_is_a_wrong_unit(tmp_path):
+    (sheet := tmp_path / "arm.toml").write_text(
+        "length = 0.6\nbending_stiffness = 0.00064\nmass_per_length = 2.83\ncable_offset = 0.02\n"
+    )
+    found = check(arm(), plant=read_spec_sheet(sheet, 0.05))
+    assert found.source == "the data sheet"
+    (finding,) = found.findings
+    assert finding.verdict == "infeasible"
+    assert "N m2" in finding.advice
+
+
 def test_a_record_is_read_from_csv(tmp_path):
     record = probe(SimulatedPlant(Rod.preset("paper")), (-10, 10), seed=3, duration=5.0)
     lines = ["t [s],y1 [m],y2 [m],u1 [N],u2 [N],u3 [N]"]
@@ -116,7 +152,7 @@ def test_a_robot_is_known_from_its_data_sheet(tmp_path):
     tip = plant.rod.equilibrium([10.0, 0.0, 0.0]).tip
     assert tip[1] == pytest.approx(0.056221, rel=0.01)
     found = check(arm(), plant=plant)
-    assert found.source == "the rod"
+    assert found.source == "the data sheet"
     assert found.objections == ()
     record = probe(SimulatedPlant(Rod.preset("paper")), (-10, 10), seed=3)
     assert check(arm(), plant=plant, record=record).objections == ()

@@ -36,6 +36,10 @@ class Pulse:
         inside = self.time - 1e-9 <= time < self.time + self.duration - 1e-9
         return self.force if inside else (0.0, 0.0, 0.0)
 
+    def samples(self, sample_time: float, count: int) -> int:
+        """During how many of a task's ``count`` samples it pushes."""
+        return sum(any(self.at(k * sample_time)) for k in range(count)) if any(self.force) else count
+
 
 @dataclass(frozen=True, kw_only=True)
 class Task(ABC):
@@ -70,10 +74,15 @@ class Task(ABC):
         """Wanted outputs (k, p), m, at the instants ``time`` (k,), s; also asked for beyond the duration (preview)."""
 
     def samples(self, sample_time: float) -> int:
-        """Number of samples in the task; ValueError when there is not even one."""
+        """Number of samples in the task; ValueError when there is not even one, or its pulse pushes in none."""
         count = round(self.duration / sample_time)
         if count < 1:
             raise ValueError(f"the task's {self.duration} s are shorter than one sample of {sample_time} s")
+        if self.pulse is not None and not self.pulse.samples(sample_time, count):
+            raise ValueError(
+                f"the pulse of {self.pulse.duration:g} s at {self.pulse.time:g} s pushes in no sample of the task, "
+                f"which are {sample_time:g} s each from 0 to {self.duration:g} s: those are that begin in the pulse"
+            )
         return count
 
 
