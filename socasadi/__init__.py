@@ -62,7 +62,7 @@ from .campaign import (
     Task,
     ViolatedOutputs,
 )
-from .model import Dense, Modal
+from .model import Dense, Fixed, Modal
 from .mpc import LinearMPC
 from .plant import Camera, ExternalPlant, LaserSpot, Plant, SimulatedPlant
 from .rod import Rod
@@ -77,6 +77,7 @@ __all__ = [
     "Dense",
     "ExternalPlant",
     "FigureEight",
+    "Fixed",
     "IterationBound",
     "LaserSpot",
     "LinearMPC",

@@ -1,4 +1,4 @@
-"""Would you have got there without Bayesian optimisation: this package beside twelve other ways to a controller.
+"""Would you have got there without Bayesian optimisation: this package beside fourteen other ways to a controller.
 
     socasadi compare studies/compare.py --smoke       does it work: under two minutes
     socasadi compare studies/compare.py --quick       three seeds, 30 episodes' worth of the robot's time
@@ -32,7 +32,7 @@ from socasadi.baselines import (
     Rubbing,
     Softer,
     Subspace,
-    Weights,
+    WeightSearch,
 )
 from socasadi.rod import Payload
 
@@ -50,12 +50,13 @@ comparison = Comparison(
         "payload": replace(circle, plant=loaded),
     },
     methods={
-        "socasadi": ModelSearch(),
+        "socasadi": WeightSearch("subspace", probing=40.0),
+        "model search": ModelSearch(),
         "Sobol": ModelSearch("sobol"),
         "random": ModelSearch("random"),
         "identified": Identified(),
         "N4SID": Subspace(),
-        "weights": Weights(),
+        "weights": WeightSearch("family"),
         "PID": PID(),
         "H-infinity": HInfinity(),
         "Koopman": Koopman(),

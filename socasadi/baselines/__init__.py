@@ -6,7 +6,7 @@ experiment costs is the same for all: see there.
 
 from ._compare import Comparison, Size, fly_cell, load_comparison, run_comparison, stored_cells
 from ._deepc import DeePC
-from ._fixed import Identified, Linearised
+from ._fixed import Identified, Linearised, Subspace
 from ._judge import Elsewhere, Worth, worth, worth_elsewhere
 from ._koopman import Koopman
 from ._lab import BudgetSpent, Lab
@@ -18,10 +18,9 @@ from ._others import DeadCable, Delayed, Loaded, Misrouted, Noisier, Rubbing, So
 from ._pid import PID
 from ._robust import HInfinity
 from ._search import ModelSearch
-from ._subspace import Subspace
 from ._summary import Summary
 from ._summary import table as summary_table
-from ._weights import Weights
+from ._weights import WeightSearch
 
 __all__ = [
     "PID",
@@ -52,7 +51,7 @@ __all__ = [
     "Softer",
     "Subspace",
     "Summary",
-    "Weights",
+    "WeightSearch",
     "Worth",
     "fly_cell",
     "identified",

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ..campaign import Pilot
-from ..model import StateSpace
+from ..model import StateSpace, subspace
 from ..plant import SimulatedPlant
 from ._lab import Lab
 from ._method import Information, Method, identified
@@ -24,6 +24,22 @@ class Identified(Method):
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         yield lab.study.mpc.controller_for(identified(lab, self.probing))
+
+
+@dataclass(frozen=True)
+class Subspace(Method):
+    """The study's MPC on the model that N4SID finds in a probing record; see :func:`subspace`.
+
+    Parameters
+    ----------
+    probing
+        s of probing.
+    """
+
+    probing: float = 40.0
+
+    def offers(self, lab: Lab) -> Iterator[Pilot]:
+        yield lab.study.mpc.controller_for(subspace(lab.probe(self.probing)))
 
 
 @dataclass(frozen=True)

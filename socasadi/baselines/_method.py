@@ -1,8 +1,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -101,14 +100,6 @@ def identified(lab: Lab, probing: float) -> StateSpace:
     """The model of the study's family that fits a probing record of so many s best."""
     mpc = lab.study.mpc
     return mpc.model.state_space(identify(mpc.model, lab.probe(probing), seed=lab.study.seed), mpc.sample_time)
-
-
-def needed(package: str, purpose: str) -> Any:
-    """An optional package, imported late; ModuleNotFoundError that says how to get it."""
-    try:
-        return import_module(package)
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"{purpose} needs {package}: pip install 'socasadi[baselines]'") from error
 
 
 def static_gain(model: StateSpace) -> np.ndarray:

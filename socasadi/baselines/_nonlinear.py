@@ -38,11 +38,14 @@ class NonlinearMPC(Method):
         Samples that are looked ahead.
     iterations
         Programs a sample.
+    doubt
+        A factor on the unknown input that the study's MPC assumes: a model that is the robot itself may be trusted.
     """
 
     model: Literal["rod", "constant curvature"] = "rod"
     horizon: int = 20
     iterations: int = 2
+    doubt: float = 0.01
 
     @property
     def information(self) -> Information:
@@ -104,7 +107,7 @@ class _Controller(Law):
             self._x, A, B, expected, C = self._sample(self._x, self.held)
             self._covariance[:n] = A @ self._covariance[:n]
             self._covariance[:, :n] = self._covariance[:, :n] @ A.T
-            self._covariance[:n, :n] += B @ noise.input @ B.T
+            self._covariance[:n, :n] += self._method.doubt**2 * B @ noise.input @ B.T
             self._covariance[n:, n:] += noise.disturbance
         self._first = False
         seen = np.hstack([C, np.eye(p)])

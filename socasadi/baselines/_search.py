@@ -9,7 +9,7 @@ from ._method import Method, tuned
 
 @dataclass(frozen=True)
 class ModelSearch(Method):
-    """The prediction model that controls best, sought in closed loop: what this package is for.
+    """The prediction model that controls best, sought in closed loop, as in arXiv 2210.08780.
 
     Parameters
     ----------

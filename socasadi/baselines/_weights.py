@@ -1,39 +1,38 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-
-import numpy as np
+from typing import Literal
 
 from ..campaign import Pilot
-from ..model import Entry
+from ..model import Fixed, subspace
 from ._lab import Lab
 from ._method import Method, identified, tuned
 
 
 @dataclass(frozen=True)
-class Weights(Method):
-    """The model is identified once, and the MPC's weights and its observer are tuned by flights.
+class WeightSearch(Method):
+    """A model is identified once, and what the study's MPC assumes and weighs is tuned by flights.
 
     Neumann-Brosig, Marco, Schwarzmann, Trimpe, "Data-efficient autotuning with Bayesian optimization: an industrial
-    control study", IEEE Trans. Control Systems Technology 28(3), 2020 (arXiv 1812.06325). Open are R (of Q and R only
-    the quotient matters), and what the observer assumes of unknown inputs and of the disturbance, against its sensor's
-    noise; each within two decades of what the study has.
+    control study", IEEE Trans. Control Systems Technology 28(3), 2020 (arXiv 1812.06325), for an MPC.
 
     Parameters
     ----------
+    model
+        ``"family"``, the member of the study's family that predicts a probing record best; ``"subspace"``, see
+        :func:`socasadi.model.subspace`.
     probing
         s of probing.
+    tuned
+        Settings that theta holds, each within two decades, as of :class:`LinearMPC`. Of Q and R only the quotient
+        matters, and of the sensor's noise and the others.
     """
 
+    model: Literal["family", "subspace"] = "family"
     probing: float = 20.0
+    tuned: tuple[str, ...] = ("R", "input_noise", "disturbance_noise")
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
-        mpc, model = lab.study.mpc, identified(lab, self.probing)
-        names = ("R", "input_noise", "disturbance_noise")
-        given = {name: np.asarray(getattr(mpc, name), dtype=float) for name in names}
-
-        def build(factors: np.ndarray) -> Pilot:
-            changed = {name: factor * given[name] for name, factor in zip(names, factors, strict=True)}
-            return replace(mpc, **changed).controller_for(model)
-
-        knobs = [Entry(f"factor on {name}", "1", 0.01, 100.0, "log") for name in names]
-        return tuned(lab, knobs, build, initial=[np.ones(len(names))])
+        mpc = lab.study.mpc
+        found = identified(lab, self.probing) if self.model == "family" else subspace(lab.probe(self.probing))
+        searched = replace(mpc, model=Fixed.of(found, mpc.sample_time), tuned=self.tuned)
+        return tuned(lab, searched.entries, searched.controller, initial=[searched.whole(())])

@@ -3,13 +3,16 @@
 from ._base import PredictionModel, StateSpace
 from ._dense import Dense
 from ._entry import Entry
+from ._fixed import Fixed
 from ._identify import bounds_from_record, identify, prediction_error, state_space_error
 from ._modal import Modal
 from ._record import Record
+from ._subspace import subspace
 
 __all__ = [
     "Dense",
     "Entry",
+    "Fixed",
     "Modal",
     "PredictionModel",
     "Record",
@@ -18,4 +21,5 @@ __all__ = [
     "identify",
     "prediction_error",
     "state_space_error",
+    "subspace",
 ]

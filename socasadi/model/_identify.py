@@ -46,6 +46,8 @@ def identify(
         The record has other numbers of inputs or outputs than the model, or its tensions do not vary independently.
     """
     _check_fit(model, record)
+    if model.size == 0:
+        return np.zeros(0)
     varied = np.linalg.matrix_rank(record.tension - record.tension.mean(axis=0))
     if varied < model.inputs:
         raise ValueError(

@@ -19,17 +19,16 @@ from socasadi.baselines import (
     Linearised,
     NonlinearMPC,
     Subspace,
-    Weights,
+    WeightSearch,
     _deepc,
     _koopman,
     worth,
 )
 from socasadi.baselines._nonlinear import _advance
 from socasadi.baselines._robust import _most_robust
-from socasadi.baselines._subspace import n4sid
 from socasadi.campaign import probe
 from socasadi.codegen import c_compiler
-from socasadi.model import StateSpace
+from socasadi.model import StateSpace, subspace
 
 compiled = pytest.mark.skipif(c_compiler() is None, reason="its program is solved in C")
 
@@ -42,7 +41,8 @@ def last_offer(method, lab):
 
 
 FEW = {
-    "weights": (Weights(probing=6.0), 1.2),
+    "weights": (WeightSearch(probing=6.0), 1.2),
+    "weights on N4SID": (WeightSearch("subspace", probing=12.0), 1.1),
     "PID": (PID(probing=6.0), 4.0),
     "H-infinity": (HInfinity(probing=6.0), 4.0),
     "N4SID": (Subspace(probing=12.0), 1.1),
@@ -135,7 +135,7 @@ def test_a_lifting_without_monomials_predicts_a_linear_robot_exactly():
 
 
 def test_n4sid_finds_the_response_of_the_robot():
-    found = n4sid(probe(LinearPlant(), (-10, 10), duration=20.0), 4)
+    found = subspace(probe(LinearPlant(), (-10, 10), duration=20.0), 4)
     for k in range(30):
         theirs, true = (m.C @ np.linalg.matrix_power(m.A, k) @ m.B + (m.D if k == 0 else 0) for m in (found, SYSTEM))
         np.testing.assert_allclose(theirs, true, atol=1e-6)
@@ -178,7 +178,7 @@ def test_the_difference_quotients_are_the_derivatives_of_the_rods_step():
 def test_near_rest_the_nonlinear_mpc_does_what_the_one_on_the_linearisation_does():
     made = rod_study()
     small = Lab(study(made.plant, preview=10), (60.0,))
-    (nonlinear,), (linear,) = (list(method.offers(small)) for method in (NonlinearMPC(), Linearised()))
+    (nonlinear,), (linear,) = (list(method.offers(small)) for method in (NonlinearMPC(doubt=1.0), Linearised()))
     assert nonlinear.mpc == linear.mpc
     task = SetPoints(points=((0.004, -0.002),), duration=4.0)
     flown = [worth(replace(made, task=task), pilot, 1)[0] for pilot in (nonlinear, linear)]

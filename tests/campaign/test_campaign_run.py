@@ -42,6 +42,18 @@ class TestContinuation:
         assert len(longer.trials) == 13
 
 
+def test_factors_on_settings_are_searched_shown_and_exported_with_the_model(toy_study, tmp_path):
+    study = replace(toy_study, mpc=replace(toy_study.mpc, tuned={"R": (0.1, 10.0), "input_noise": (0.01, 1.0)}))
+    result = study.run(tmp_path / "run", progress=None)
+    factors = points(result)[:, -2:]
+    assert np.ptp(np.log(factors), axis=0).min() > 1.0
+    assert Result.open(tmp_path / "run").study.mpc == study.mpc
+    record = result.controller_record()
+    assert pytest.approx(result.chosen.theta[-2]) == record.mpc.R
+    assert record.mpc.tuned == ()
+    assert any("R_factor" in line for line in record.provenance)
+
+
 class TestFailures:
     class Fragile:
         """Breaks whenever a tension exceeds a limit, as a robot with a weak cable would."""

@@ -1,0 +1,60 @@
+"""A model that is given, and one that a record gives."""
+
+import numpy as np
+import pytest
+
+from socasadi import Fixed, LinearMPC, Modal
+from socasadi.campaign.store import describe, rebuild
+from socasadi.model import Record, StateSpace, identify, prediction_error, subspace
+
+THETA = np.array([4.4, 0.1, 0.0056, -0.0028, -0.0028, 4.7, 0.08, 0.0, 0.0049, -0.0049])
+SYSTEM = Modal().state_space(THETA, 0.05)
+
+
+def record(samples, noise=0.0):
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.uniform(-5, 5, (samples // 10, 3)), 10, axis=0)
+    x, y = np.zeros(4), [np.zeros(2)]
+    for row in u:
+        x = SYSTEM.A @ x + SYSTEM.B @ row
+        y.append(SYSTEM.C @ x)
+    return Record(0.05, u, np.array(y) + noise * rng.standard_normal((samples + 1, 2)))
+
+
+def test_a_fixed_model_is_its_system_and_has_nothing_open():
+    model = Fixed.of(SYSTEM, 0.05)
+    assert (model.size, model.order, model.inputs, model.axes) == (0, 4, 3, 2)
+    for name, found, given in zip("ABCD", model.state_space((), 0.05), SYSTEM, strict=True):
+        np.testing.assert_array_equal(found, given, err_msg=name)
+    assert prediction_error(model, (), record(200)) < 1e-12
+    assert identify(model, record(200)).shape == (0,)
+    assert rebuild(describe(model)) == model
+
+
+def test_its_controller_is_that_of_the_model():
+    fixed, modal = LinearMPC(Fixed.of(SYSTEM, 0.05), tuned=("R",)), LinearMPC(Modal())
+    ours, theirs = fixed.controller([1.0]), modal.controller(THETA)
+    for y in 0.01 * np.random.default_rng(0).standard_normal((20, 2)):
+        np.testing.assert_array_equal(ours.step(y, [0.02, 0.0]), theirs.step(y, [0.02, 0.0]))
+
+
+def test_what_does_not_fit_is_refused():
+    with pytest.raises(ValueError, match=r"B of a fixed model has shape \(4, 2\); \(4, 3\) fits"):
+        Fixed(2, 3, None, SYSTEM.A, SYSTEM.B[:, :2], SYSTEM.C, SYSTEM.D)
+    with pytest.raises(ValueError, match="C of a fixed model is not finite"):
+        Fixed.of(StateSpace(SYSTEM.A, SYSTEM.B, np.nan * SYSTEM.C, SYSTEM.D), 0.05)
+    with pytest.raises(ValueError, match=r"every 0.05 s, not every 0.1 s"):
+        Fixed.of(SYSTEM, 0.05).state_space((), 0.1)
+
+
+def test_a_record_gives_the_model_back_with_its_order():
+    found = subspace(record(600, noise=1e-4))
+    assert len(found.A) >= 4
+    for k in (0, 5, 20):
+        theirs, true = (m.C @ np.linalg.matrix_power(m.A, k) @ m.B for m in (found, SYSTEM))
+        np.testing.assert_allclose(theirs, true, atol=2e-5)
+
+
+def test_a_record_that_is_too_short_is_told_so():
+    with pytest.raises(ValueError, match="100 samples; 129 are needed"):
+        subspace(record(100))
