@@ -1,4 +1,4 @@
-"""Would you have got there without Bayesian optimisation: this package beside fourteen other ways to a controller.
+"""Would you have got there without Bayesian optimisation: this package beside fifteen other ways to a controller.
 
     socasadi compare studies/compare.py --smoke       does it work: under two minutes
     socasadi compare studies/compare.py --quick       three seeds, 30 episodes' worth of the robot's time
@@ -39,6 +39,9 @@ from socasadi.rod import Payload
 loaded = SimulatedPlant(replace(Rod.preset("paper"), payloads=Payload(0.1)), sample_time=0.05, noise=1e-3)
 stairs = ((0.02, 0.0), (0.04, 0.0), (0.06, 0.0), (0.03, 0.03))
 
+# Robots beside its own for which a controller is tuned as well, where it is tuned for robustness.
+OTHERS = (Softer(young=0.8), Softer(young=1.2), Misrouted(1.2), Delayed(1))
+
 comparison = Comparison(
     study=circle,
     tasks={
@@ -51,6 +54,7 @@ comparison = Comparison(
     },
     methods={
         "socasadi": WeightSearch("subspace", probing=40.0),
+        "for the worst": WeightSearch("subspace", probing=40.0, over=OTHERS, by="worst"),
         "model search": ModelSearch(),
         "Sobol": ModelSearch("sobol"),
         "random": ModelSearch("random"),

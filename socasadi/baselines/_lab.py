@@ -1,9 +1,11 @@
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..campaign import Episode, Pilot, Study, fly_once, probe
 from ..model import Record
+from ..plant import Plant
 
 _TRIAL, _PROBE = 0, 2
 """Streams of random numbers: those of a campaign's trials and probing records."""
@@ -40,10 +42,10 @@ class Lab:
         self.spent = 0.0
         self.flights = self.probes = self.failed = 0
 
-    @property
-    def due(self) -> bool:
-        """Whether one more flight may pass a checkpoint: whoever has a controller to offer should do so now."""
-        return any(self.spent <= at + _ROUNDING < self.spent + self.study.task.duration for at in self.checkpoints)
+    def due(self, flights: int = 1) -> bool:
+        """Whether so many more flights may pass a checkpoint: who has a controller to offer should do so now."""
+        then = self.spent + flights * self.study.task.duration
+        return any(self.spent <= at + _ROUNDING < then for at in self.checkpoints)
 
     def probe(self, duration: float = 20.0) -> Record:
         """A probing record of so many s: random steps of all tensions, half of the way to their bounds at most.
@@ -60,7 +62,9 @@ class Lab:
         self.spent += duration
         return record
 
-    def fly(self, pilot: Pilot, *, give_up: float | None = None, number: int | None = None) -> Episode:
+    def fly(
+        self, pilot: Pilot, *, give_up: float | None = None, number: int | None = None, plant: Plant | None = None
+    ) -> Episode:
         """One experiment with a controller.
 
         Parameters
@@ -69,6 +73,8 @@ class Lab:
             Value of J from which on it is cut; the seconds that it saves are not counted.
         number
             Of the experiment, which decides on its noise; by default how many there were, plus one.
+        plant
+            Another robot than the study's, whose time counts alike.
 
         Raises
         ------
@@ -77,7 +83,8 @@ class Lab:
         """
         self._check(self.study.task.duration)
         self.flights += 1
-        episode = fly_once(self.study, pilot, stream=(_TRIAL, number or self.flights), give_up=give_up)
+        study = self.study if plant is None else replace(self.study, plant=plant)
+        episode = fly_once(study, pilot, stream=(_TRIAL, number or self.flights), give_up=give_up)
         self.spent += len(episode.tension) * episode.sample_time
         self.failed += episode.failure is not None
         return episode

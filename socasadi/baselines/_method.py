@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from ..campaign import Pilot, Study
 from ..model import Entry, StateSpace, identify
 from ..mpc import DesignError
+from ..plant import Plant
 from ..tune import Optimizer, RandomSearch, Search, SobolSearch, Space
 from ._lab import Lab
 
@@ -58,6 +59,8 @@ def tuned(
     *,
     kind: str = "bayesian",
     initial: Sequence[ArrayLike] = (),
+    over: Sequence[Callable[[Plant], Plant]] = (),
+    by: Literal["mean", "worst"] = "mean",
 ) -> Iterator[Pilot]:
     """Fly what ``build`` makes of the knobs' values, and look for the best until the time is spent.
 
@@ -74,8 +77,14 @@ def tuned(
         ``"bayesian"``, ``"sobol"`` or ``"random"``.
     initial
         Values that are tried first.
+    over
+        Other robots, each made of the study's own, on all of which every controller is flown beside it. They take the
+        robot's time in turn.
+    by
+        What counts of the several J.
     """
     study, search, in_vain = lab.study, search_for(kind, Space(knobs), lab.study, initial), 0
+    plants = [None, *(other(study.plant) for other in over)]
     while in_vain < _WITHOUT_FLIGHT:
         theta, number = search.ask(), len(search.trials) + 1
         try:
@@ -86,14 +95,43 @@ def tuned(
             continue
         best = search.best.cost if search.best else None
         give_up = None if best is None or study.give_up is None else study.give_up * best
-        episode, in_vain = lab.fly(pilot, give_up=give_up, number=number), 0
-        if episode.cut is not None:
-            search.tell(theta, at_least=episode.cut)
-        else:
-            J = lab.cost(episode)
-            search.tell(theta, J, failed=J is None)
-        if lab.due and (chosen := search.best_estimated or search.best) is not None:
+        in_vain = 0
+        _tell(search, theta, _flown(lab, pilot, plants, by, give_up, number))
+        if lab.due(len(plants)) and (chosen := search.best_estimated or search.best) is not None:
             yield build(chosen.theta)
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What a controller costs, or at least costs; neither where it failed."""
+
+    J: float | None = None
+    at_least: float | None = None
+
+
+def _flown(
+    lab: Lab, pilot: Pilot, plants: Sequence[Plant | None], by: str, give_up: float | None, number: int
+) -> _Outcome:
+    """One flight on each of the robots; none after one that fails, or that proves the whole to be hopeless."""
+    costs: list[float] = []
+    for plant in plants:
+        # What of the whole a single flight may still take.
+        spare = None if give_up is None else give_up if by == "worst" else len(plants) * give_up - sum(costs)
+        episode = lab.fly(pilot, give_up=spare, number=number, plant=plant)
+        if episode.cut is not None:
+            costs.append(episode.cut)
+            return _Outcome(at_least=max(costs) if by == "worst" else sum(costs) / len(plants))
+        if (J := lab.cost(episode)) is None:
+            return _Outcome()
+        costs.append(J)
+    return _Outcome(max(costs) if by == "worst" else sum(costs) / len(plants))
+
+
+def _tell(search: Search, theta: np.ndarray, outcome: _Outcome) -> None:
+    if outcome.at_least is not None:
+        search.tell(theta, at_least=outcome.at_least)
+    else:
+        search.tell(theta, outcome.J, failed=outcome.J is None)
 
 
 def identified(lab: Lab, probing: float) -> StateSpace:

@@ -1,9 +1,10 @@
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from ..campaign import Pilot
 from ..model import Fixed, subspace
+from ..plant import Plant
 from ._lab import Lab
 from ._method import Method, identified, tuned
 
@@ -25,14 +26,21 @@ class WeightSearch(Method):
     tuned
         Settings that theta holds, each within two decades, as of :class:`LinearMPC`. Of Q and R only the quotient
         matters, and of the sensor's noise and the others.
+    over, by
+        Other robots on which every controller is flown beside the study's, and whether the mean or the worst J counts:
+        a search for robustness, whose flights cost as many times the robot's time.
     """
 
     model: Literal["family", "subspace"] = "family"
     probing: float = 20.0
     tuned: tuple[str, ...] = ("R", "input_noise", "disturbance_noise")
+    over: tuple[Callable[[Plant], Plant], ...] = ()
+    by: Literal["mean", "worst"] = "mean"
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         mpc = lab.study.mpc
         found = identified(lab, self.probing) if self.model == "family" else subspace(lab.probe(self.probing))
         searched = replace(mpc, model=Fixed.of(found, mpc.sample_time), tuned=self.tuned)
-        return tuned(lab, searched.entries, searched.controller, initial=[searched.whole(())])
+        return tuned(
+            lab, searched.entries, searched.controller, initial=[searched.whole(())], over=self.over, by=self.by
+        )

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from baselines_support import SYSTEM, THETA, LinearPlant, study
 
-from socasadi.baselines import BudgetSpent, Identified, Lab, Method, ModelSearch, static_gain
+from socasadi.baselines import BudgetSpent, Identified, Lab, Method, ModelSearch, static_gain, tuned
 from socasadi.campaign import Pilot
+from socasadi.model import Entry
 
 
 def test_every_experiment_is_paid_by_the_second_and_none_is_begun_that_cannot_be():
@@ -71,6 +72,37 @@ def test_a_search_offers_its_best_at_every_checkpoint(kind):
     assert early[0] <= 12.0 < late[0] <= 48.0
     costs = [lab.cost(Lab(lab.study, (1e3,)).fly(pilot, number=99)) for _, pilot in (early, late)]
     assert costs[1] <= 1.02 * costs[0]
+
+
+def test_a_search_for_robustness_counts_the_worst_robot_or_the_mean_and_pays_for_all():
+    class Weak(LinearPlant):
+        def step(self, tension, tip_force=None):
+            return super().step(0.6 * np.asarray(tension))
+
+    def told(by):
+        lab, costs = Lab(study(), (5 * 12.0,)), []
+        fly = lab.fly
+
+        def watched(pilot, **given):
+            episode = fly(pilot, **given)
+            costs.append(lab.cost(episode) or np.inf)
+            return episode
+
+        lab.fly = watched
+        entries = (Entry("x", "1", 0.5, 2.0, "log"),)
+        mpc = replace(lab.study.mpc, tuned=("R",))
+        build = lambda x: mpc.controller([*THETA, *x])  # noqa: E731
+        offers = tuned(lab, entries, build, over=(lambda plant: Weak(),), by=by)
+        with pytest.raises(BudgetSpent):
+            list(offers)
+        return lab, costs
+
+    for by in ("worst", "mean"):
+        lab, costs = told(by)
+        assert lab.spent == pytest.approx(60.0)
+        assert lab.flights == len(costs) == 10
+        # The weak robot is the dearer one in every pair.
+        assert all(weak > own for own, weak in zip(costs[::2], costs[1::2], strict=True))
 
 
 def test_the_identified_model_is_the_robots_own():
