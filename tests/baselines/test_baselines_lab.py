@@ -18,10 +18,11 @@ def test_every_experiment_is_paid_by_the_second_and_none_is_begun_that_cannot_be
     lab.probe(5.0)
     lab.fly(controller)
     assert lab.spent == pytest.approx(11.0)
-    assert lab.due  # a flight of 6 s passes the checkpoint at 12 s
+    assert lab.due()  # a flight of 6 s passes the checkpoint at 12 s
     lab.fly(controller)
     assert lab.spent == pytest.approx(17.0)
-    assert not lab.due
+    assert not lab.due()
+    assert lab.due(3)
     cut = lab.fly(controller, give_up=1e-3)
     assert cut.cut is not None
     assert lab.spent == pytest.approx(17.0 + len(cut.tension) * 0.05)
