@@ -24,7 +24,8 @@ class DeePC(Method):
         \min_g\; \sum |y - r|_Q^2 + \rho_R(u) + \lambda_g |g|^2 + \lambda_y |Y_p g - y_{ini}|^2, \qquad
         U_p g = u_{ini},\; u = U_f g,\; y = Y_f g
 
-    within the bounds of the study's MPC. Both regularisations are tuned by flights.
+    within the bounds of the study's MPC. How many samples make the past, and both regularisations are tuned by
+    flights.
 
     Parameters
     ----------
@@ -32,25 +33,28 @@ class DeePC(Method):
         Whether the matrices hold changes from sample to sample, which leaves no steady error.
     probing
         s of probing.
-    past, horizon
-        Samples that say where the robot is, and that are looked ahead.
+    horizon
+        Samples that are looked ahead.
     """
 
     velocity: bool = False
     probing: float = 40.0
-    past: int = 6
     horizon: int = 20
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         mpc, record = lab.study.mpc, lab.probe(self.probing)
-        knobs = (Entry("on the combination", "1", 1e-4, 1e3, "log"), Entry("on the past", "1/m2", 1e2, 1e8, "log"))
-        return tuned(lab, knobs, lambda weights: _Controller(self, mpc, record, weights), initial=[(1.0, 1e5)])
+        knobs = (
+            Entry("past", "samples", 4.0, 24.0, "log"),
+            Entry("on the combination", "1", 1e-4, 1e3, "log"),
+            Entry("on the past", "1/m2", 1e2, 1e8, "log"),
+        )
+        return tuned(lab, knobs, lambda x: _Controller(self, mpc, record, *x), initial=[(10.0, 1.0, 1e5)])
 
 
 class _Controller(Law):
-    def __init__(self, method: DeePC, mpc: LinearMPC, record: Record, weights: np.ndarray) -> None:
+    def __init__(self, method: DeePC, mpc: LinearMPC, record: Record, past: float, on_g: float, on_past: float) -> None:
         super().__init__(mpc)
-        m, p, past, N = mpc.inputs, mpc.outputs, method.past, method.horizon
+        m, p, past, N = mpc.inputs, mpc.outputs, round(past), method.horizon
         self._past, self._horizon, self._velocity = past, N, method.velocity
         # An output belongs to the input that was held before it.
         u, y = record.tension / mpc.input_scale, record.output[1:]
@@ -74,7 +78,6 @@ class _Controller(Law):
             add_u, add_y = (np.kron(np.tril(np.ones((N, N))), np.eye(size)) for size in (m, p))
             input = (add_u @ input[0], add_u @ input[1] + np.tile(pick["before"], (N, 1)))
             output = (add_y @ output[0], add_y @ output[1] + np.tile(pick["now"], (N, 1)))
-        on_g, on_past = weights
         missed = Yp @ known - pick["y"]
         own = (
             2 * (on_g * np.eye(free.shape[1]) + on_past * (Yp @ free).T @ (Yp @ free)),

@@ -20,37 +20,41 @@ class Koopman(Method):
     predictive control", RSS 2019 (arXiv 1902.02827); Bruder et al., IEEE Trans. Robotics 37, 2020. The lifting holds
     outputs and inputs of the last samples, and monomials of the outputs among them; the lifted state comes from
     measurements at every sample. Beyond the papers a constant disturbance of the outputs is estimated, lest there is a
-    steady error. The ridge of the fit and the gain of that estimate are tuned by flights.
+    steady error. How many samples are lifted, the ridge of the fit and the gain of that estimate are tuned by flights.
 
     Parameters
     ----------
     probing
         s of probing.
-    delays
-        Samples before the present one that are lifted.
     degree
-        Of the monomials, at most.
+        Of the monomials of the last two samples' outputs, at most.
     horizon
         Samples that are looked ahead.
     """
 
     probing: float = 40.0
-    delays: int = 2
     degree: int = 3
     horizon: int = 20
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         mpc, record = lab.study.mpc, lab.probe(self.probing)
-        knobs = (Entry("ridge", "1", 1e-6, 1e1, "log"), Entry("gain of the disturbance", "1", 0.01, 1.0, "log"))
-        return tuned(lab, knobs, lambda values: _Controller(self, mpc, record, *values), initial=[(1e-3, 0.2)])
+        knobs = (
+            Entry("delays", "samples", 1.5, 8.5, "log"),
+            Entry("ridge", "1", 1e-6, 1e1, "log"),
+            Entry("gain of the disturbance", "1", 0.01, 1.0, "log"),
+        )
+        return tuned(lab, knobs, lambda x: _Controller(self, mpc, record, *x), initial=[(5.0, 1e-3, 0.2)])
 
 
 class _Controller(Law):
-    def __init__(self, method: Koopman, mpc: LinearMPC, record: Record, ridge: float, gain: float) -> None:
+    def __init__(
+        self, method: Koopman, mpc: LinearMPC, record: Record, delays: float, ridge: float, gain: float
+    ) -> None:
         super().__init__(mpc)
+        self._delays = d = round(delays)
         self._method, self._gain, p, m, N = method, gain, mpc.outputs, mpc.inputs, method.horizon
         self._unit = float(np.abs(record.output).max())  # so that monomials are of the size of what they are made of
-        u, y, d = record.tension / mpc.input_scale, record.output, method.delays
+        u, y = record.tension / mpc.input_scale, record.output
         lifted = np.array([self._lift(y[t - d : t + 1][::-1], u[t - d : t][::-1]) for t in range(d, len(u) + 1)])
         known = np.hstack([lifted[:-1], u[d:]])
         size = lifted.shape[1]
@@ -75,14 +79,14 @@ class _Controller(Law):
 
     def begin(self) -> None:
         self._program.forget()
-        self._u = np.tile(self.held / self.mpc.input_scale, (self._method.delays, 1))
+        self._u = np.tile(self.held / self.mpc.input_scale, (self._delays, 1))
         self._y: np.ndarray | None = None
         self._disturbance, self._expected = np.zeros(self.mpc.outputs), None
 
     def act(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
         before = self.held / self.mpc.input_scale
         if self._y is None or self._expected is None:  # it was at rest so far
-            self._y = np.tile(y, (self._method.delays + 1, 1))
+            self._y = np.tile(y, (self._delays + 1, 1))
         else:
             self._y = np.vstack([y, self._y[:-1]])
             self._u = np.vstack([before, self._u[:-1]])

@@ -97,7 +97,7 @@ def test_without_noise_and_regularisation_deepc_is_the_mpc_on_the_true_model():
     """The equivalence of Coulson, Lygeros, Dörfler 2019: the plan of the data is that of the model."""
     made = study(output_bounds=None)
     record = probe(LinearPlant(), (-10, 10), duration=20.0)
-    deepc = _deepc._Controller(DeePC(past=6, horizon=8), made.mpc, record, np.array([1e-9, 1e9]))
+    deepc = _deepc._Controller(DeePC(horizon=8), made.mpc, record, 6, 1e-9, 1e9)
     plant, rng = LinearPlant(), np.random.default_rng(0)
     y = plant.reset()
     deepc.reset(0.0)
@@ -123,7 +123,7 @@ def test_without_noise_and_regularisation_deepc_is_the_mpc_on_the_true_model():
 @compiled
 def test_a_lifting_without_monomials_predicts_a_linear_robot_exactly():
     made = study()
-    pilot = _koopman._Controller(Koopman(delays=2, degree=1), made.mpc, probe(LinearPlant(), (-10, 10)), 1e-12, 1.0)
+    pilot = _koopman._Controller(Koopman(degree=1), made.mpc, probe(LinearPlant(), (-10, 10)), 2, 1e-12, 1.0)
     plant, errors = LinearPlant(), []
     y = plant.reset()
     pilot.reset(0.0)
