@@ -251,7 +251,7 @@ def test_a_run_folder_that_exists_needs_resume_and_the_same_settings(finished):
 def test_what_the_readme_and_the_guide_show_of_python_runs(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
     others = re.findall(r"```python\n(.*?)```", (ROOT / "studies" / "guide.md").read_text(), re.S)
-    assert len(others) == 4
+    assert len(others) == 6
     for block in others:
         run = subprocess.run([sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True)
         assert run.returncode == 0, run.stderr
