@@ -4,8 +4,9 @@ import hashlib
 import json
 import os
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, as_completed
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -22,6 +23,8 @@ from ._method import Method
 Size = Literal["smoke", "quick", "full"]
 
 _SCHEMA = 1
+_LOSSES = 2
+"""Times that a cell is flown again when its worker has died."""
 
 
 @dataclass(frozen=True)
@@ -142,6 +145,8 @@ def _flown(comparison: Comparison, task: str, method: str, seed: int) -> dict[st
             offers |= {at: (pilot, lab.spent) for at in seconds if at >= lab.spent - 1e-9}
     except BudgetSpent:
         pass
+    except ModuleNotFoundError:  # of the machine, not of the method
+        raise
     except Exception as error:  # a method that cannot is a result; the others go on
         broke = f"{type(error).__name__}: {error}"
     judged: dict[int, dict[str, Any]] = {}
@@ -234,6 +239,11 @@ def run_comparison(
         Where they are flown: it is sent names and answers by text.
     progress
         Is told each cell that is done, how many are, and of how many.
+
+    Raises
+    ------
+    RunError
+        No worker can fly a cell, or they die of one; what was done is stored.
     """
     comparison = load_comparison(script, size)
     known = {(c["task"], c["method"], c["seed"]): c for c in stored_cells(folder)}
@@ -245,16 +255,31 @@ def run_comparison(
             cells.append(cell)
         else:
             missing.append((task, method, seed))
-    total = len(comparison.cells)
-    waiting: dict[Future, tuple[str, str, int]] = {
-        executor.submit(order_cell, str(script.resolve()), size, *names): names for names in missing
-    }
+    total, losses = len(comparison.cells), Counter()
+    waiting: dict[Future, tuple[str, str, int]] = {}
+
+    def send(names: tuple[str, str, int]) -> None:
+        waiting[executor.submit(order_cell, str(script.resolve()), size, *names)] = names
+
     try:
-        for future in as_completed(waiting):
-            cell = json.loads(future.result())
-            _store(folder, cell)
-            cells.append(cell)
-            progress(cell, len(cells), total)
+        for names in missing:
+            send(names)
+        while waiting:
+            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                names = waiting.pop(future)
+                try:
+                    cell = json.loads(future.result())
+                except BrokenExecutor as error:  # its worker died, of this cell or of something else
+                    losses[names] += 1
+                    if losses[names] > _LOSSES:
+                        raise RunError(f"{', '.join(map(str, names))}: its workers die ({error})") from error
+                    send(names)
+                except Exception as error:
+                    raise RunError(f"{', '.join(map(str, names))}: {error}") from error
+                else:
+                    _store(folder, cell)
+                    cells.append(cell)
+                    progress(cell, len(cells), total)
     finally:
         for future in waiting:
             future.cancel()

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -150,6 +150,37 @@ def test_cells_are_kept_and_only_what_is_missing_or_changed_is_flown(tmp_path):
     some = Here()
     run_comparison(script, "full", out, some)
     assert some.done == 4 + ("identified" not in files[0].name)
+
+
+def test_a_cell_whose_worker_dies_is_flown_again_and_one_that_kills_them_ends_the_comparison_in_a_sentence(tmp_path):
+    class Mortal(Here):
+        def __init__(self, deaths):
+            super().__init__()
+            self.deaths = deaths
+
+        def submit(self, fn, /, *args, **kwargs):
+            if self.deaths and args[3] == "identified":
+                self.deaths -= 1
+                future: Future = Future()
+                future.set_exception(BrokenExecutor("signal 9"))
+                return future
+            return super().submit(fn, *args, **kwargs)
+
+    (script := tmp_path / "script.py").write_text(SCRIPT)
+    assert len(run_comparison(script, "full", tmp_path / "some", Mortal(2))) == 8
+    with pytest.raises(RunError, match=r"identified, \d: its workers die \(signal 9\)"):
+        run_comparison(script, "full", tmp_path / "all", Mortal(99))
+
+
+def test_what_is_not_installed_is_no_result_of_a_method():
+    @dataclass(frozen=True)
+    class Lacking(Method):
+        def offers(self, lab: Lab) -> Iterator[Pilot]:
+            yield from ()
+            raise ModuleNotFoundError("No module named 'x'; pip install x")
+
+    with pytest.raises(ModuleNotFoundError, match="pip install x"):
+        fly_cell(comparison(methods={"lacking": Lacking()}), "circle", "lacking", 0)
 
 
 def test_a_size_is_less_of_the_same():
