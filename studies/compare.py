@@ -69,7 +69,7 @@ comparison = Comparison(
         "ILC": IterativeLearning(),
         "linearised": Linearised(),
         "nonlinear MPC": NonlinearMPC(),
-        "constant curvature": NonlinearMPC("constant curvature"),
+        "constant curvature": NonlinearMPC("constant curvature", doubt=1.0),
     },
     elsewhere={
         "E -20 %": Softer(young=0.8),

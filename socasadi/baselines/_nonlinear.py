@@ -39,7 +39,8 @@ class NonlinearMPC(Method):
     iterations
         Programs a sample.
     doubt
-        A factor on the unknown input that the study's MPC assumes: a model that is the robot itself may be trusted.
+        A factor on the unknown input that the study's MPC assumes: a model that is the robot itself may be trusted, and
+        one of constant curvature may not.
     """
 
     model: Literal["rod", "constant curvature"] = "rod"
