@@ -5,7 +5,7 @@ from ._bench import Bench
 from ._emulate import ProcessorInTheLoop, emulate
 from ._result import Result
 from ._study import Study
-from ._table import bound_notes, told_outcome, trial_row, trials_csv, verdict_row
+from ._table import bound_notes, estimate_told, told_outcome, trial_row, trials_csv, verdict_row
 from .execution import (
     Campaign,
     DaskExecutor,
@@ -94,6 +94,7 @@ __all__ = [
     "clock",
     "dask_executor",
     "emulate",
+    "estimate_told",
     "fly",
     "fly_once",
     "interruptible",

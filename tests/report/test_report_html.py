@@ -13,10 +13,11 @@ import pytest
 from report_support import MODEL, small_run
 
 from socasadi import Circle, ExternalPlant, LinearMPC, Study
-from socasadi.campaign import Campaign
+from socasadi.campaign import Campaign, Result
 from socasadi.feasibility import check
 from socasadi.report import html_report
 from socasadi.report.html import _data, _pieces
+from socasadi.tune import Estimate
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +104,14 @@ def test_the_page_names_theta_with_units_and_where_it_is_likely(result, page):
         assert found["values"][0] <= low <= high <= found["values"][-1]
         assert np.all(np.array(found["low"]) <= np.array(found["middle"]))
         assert np.all(np.array(found["middle"]) <= np.array(found["high"]))
+
+
+def test_an_estimate_that_says_nothing_gives_its_tile_no_number(result, folder, monkeypatch):
+    worthless = Estimate(0, result.trials[0].theta, 3141.0, -1.0, 9e9)
+    monkeypatch.setattr(Result, "best_estimated", worthless)
+    page = html_report(folder).read_text(encoding="utf-8")
+    assert "too few trials to say what the best is worth without noise" in page
+    assert "3141" not in page.split("<section")[0]
 
 
 def test_the_page_says_what_the_check_and_the_export_said(page):

@@ -10,7 +10,7 @@ from typing import Any
 
 import jinja2
 
-from ...campaign import Study, Units, bound_notes, trial_row, verdict_row
+from ...campaign import Study, Units, bound_notes, estimate_told, trial_row, verdict_row
 from ...campaign.store import journal_path
 from ...feasibility import Check
 from ...plant import ExternalPlant
@@ -94,9 +94,9 @@ def _told(pieces: Pieces) -> dict[str, Any]:
     tiles = []
     if best is not None:
         tiles.append(("best J observed", f"{best.J:.4g}", f"trial {best.number}"))
-    if pieces.estimate is not None and pieces.estimate.low > 0:  # no sum of squares is below
-        about = f"90 %: {pieces.estimate.low:.4g} to {pieces.estimate.high:.4g}"
-        tiles.append(("best J without noise, estimated", f"{pieces.estimate.cost:.4g}", about))
+    if pieces.estimate is not None:
+        cost, sure = estimate_told(pieces.estimate, trials)
+        tiles.append(("best J without noise, estimated", cost or "not known", sure))
     if score is not None:
         # Of a recording nothing but the measurements is known.
         outputs = "measured" if study and isinstance(study.plant, ExternalPlant) else "true"
