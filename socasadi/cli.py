@@ -131,14 +131,18 @@ def report(
     record: RobotRecord = None,
 ) -> None:
     """Write a run as one HTML file that opens from disk: all its figures, and the rod moving."""
-    from .report import html_report
+    from .report import write_report
 
     with out.status("reporting"):
         study = None if script is None else opened(run_folder, script).study
         told = spec is not None or record is not None
         found = checked(study or opened(run_folder, None).study, spec, record) if told else None
-        written = html_report(run_folder, file, study, found)
-    out.print(f"{written}: {written.stat().st_size / 1e6:.1f} MB, for any browser")
+        written = write_report(run_folder, file, study, found)
+    out.print(f"{written.file}: {written.file.stat().st_size / 1e6:.1f} MB, for any browser")
+    if written.lacks:
+        print("What this report lacks:", *written.lacks, sep="\n  ", file=sys.stderr)
+    if written.damaged:
+        raise typer.Exit(1)
 
 
 @app.command()

@@ -71,6 +71,22 @@ def test_show_plot_and_export_need_the_run_folder_alone(finished, tmp_path):
     assert (tmp_path / "c" / "controller.h").exists()
 
 
+def test_report_says_what_it_lacks_and_fails_on_damage_alone(finished, tmp_path):
+    folder, _ = finished
+    run = shutil.copytree(folder / "runs" / "study", tmp_path / "run")
+    whole = socasadi("report", run, cwd=tmp_path)
+    assert (whole.returncode, whole.stderr) == (0, "")
+    shutil.rmtree(run / "sobol")
+    without = socasadi("report", run, cwd=tmp_path)
+    assert without.returncode == 0
+    assert without.stderr.startswith("What this report lacks:\n  the Sobol baseline: there is no ")
+    (run / "journal.sqlite").write_bytes((run / "journal.sqlite").read_bytes()[:9000])
+    damaged = socasadi("report", run, cwd=tmp_path)
+    assert damaged.returncode == 1
+    assert "report.html: " in damaged.stdout
+    assert "\n  the journal: " in damaged.stderr
+
+
 def test_show_draws_the_costs_and_says_where_things_lie(finished):
     folder, _ = finished
     run = Path("runs") / "study"

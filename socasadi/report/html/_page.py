@@ -3,6 +3,7 @@ import hashlib
 import io
 import json
 import os
+from dataclasses import dataclass
 from datetime import datetime
 from importlib.resources import files
 from pathlib import Path
@@ -20,6 +21,25 @@ from ._pieces import Pieces
 
 _LARGEST = 7_800_000
 """Bytes of a page."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """A page that was written.
+
+    Attributes
+    ----------
+    file
+        Where.
+    lacks
+        What it says that it lacks, a line each.
+    damaged
+        Whether the run's settings or its journal are missing or damaged, and not only pieces that a run may lack.
+    """
+
+    file: Path
+    lacks: tuple[str, ...]
+    damaged: bool
 
 
 def html_report(
@@ -52,6 +72,13 @@ def html_report(
     ValueError
         It holds neither settings nor trials: it is no run.
     """
+    return write_report(folder, file, study, found).file
+
+
+def write_report(
+    folder: str | Path, file: str | Path | None = None, study: Study | None = None, found: Check | None = None
+) -> Report:
+    """Do as :func:`html_report`, and say what the page lacks."""
     from plotly.offline import get_plotlyjs  # takes its time
 
     folder = Path(folder)
@@ -79,7 +106,7 @@ def html_report(
         os.replace(part, file)
     finally:
         part.unlink(missing_ok=True)
-    return file
+    return Report(file, tuple(pieces.missing), pieces.damaged)
 
 
 def _environment() -> jinja2.Environment:
