@@ -262,6 +262,11 @@ def test_a_run_folder_that_exists_needs_resume_and_the_same_settings(finished):
     other = socasadi("run", "study.py", "--resume", "--seed", 5, cwd=folder)
     assert other.returncode == 1
     assert "other settings: seed was 0 and is 5" in other.stderr
+    fewer = socasadi("run", "study.py", "--resume", "--iterations", 1, cwd=folder)
+    assert fewer.returncode == 1
+    assert "holds 6 trials already; ask for no fewer, not for 5" in fewer.stderr
+    # Before anything else is done or said.
+    assert again.stdout + other.stdout + fewer.stdout == ""
 
 
 def test_what_the_readme_and_the_guide_show_of_python_runs(tmp_path):

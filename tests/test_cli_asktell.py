@@ -73,6 +73,7 @@ def socasadi(capsys, monkeypatch):
             assert ended.value.code == 1
             assert said.err.startswith("socasadi: ")
             assert len(said.err.strip().splitlines()) == 1, said.err
+            assert not said.out
             return said.err
         assert not ended.value.code, said.err
         return said.out
