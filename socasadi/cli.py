@@ -1,5 +1,6 @@
 """The command ``socasadi``."""
 
+import importlib.metadata
 import sys
 import warnings
 from io import TextIOWrapper
@@ -44,11 +45,26 @@ from .export import ExportError
 from .plant import ExternalPlantError
 
 app = typer.Typer(
-    help="Tune a soft robot's model predictive controller in closed loop, and get it as C.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"socasadi {importlib.metadata.version('socasadi')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _about(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Tune a soft robot's model predictive controller in closed loop, and get it as C."""
+
 
 app.command(name="check")(check_)
 for command in (run, init, ask, tell, compare):

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,11 @@ def test_show_plot_and_export_need_the_run_folder_alone(finished, tmp_path):
     exported = socasadi("export", run, "--out", "c", cwd=tmp_path)
     assert exported.returncode == 0, exported.stderr
     assert (tmp_path / "c" / "controller.h").exists()
+
+
+def test_it_tells_its_version(tmp_path):
+    told = socasadi("--version", cwd=tmp_path)
+    assert (told.returncode, told.stdout) == (0, f"socasadi {version('socasadi')}\n")
 
 
 def test_report_says_what_it_lacks_and_fails_on_damage_alone(finished, tmp_path):
