@@ -2,6 +2,7 @@
 
 import json
 import shlex
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -74,6 +75,7 @@ def init(
     out.print(
         f"{folder}: {study.trials} trials of {study.task.duration:g} s\n"
         f"controller  {bench.sources}: the C that no trial changes, see its README.md\n"
+        f"{_pulse(study)}"
         f"next        socasadi ask {_quoted(folder)}{again}"
     )
 
@@ -95,10 +97,14 @@ def ask(
     bench = Bench.of(opened(folder, script).study, folder)
     _check_compiler(bench.real)
     given: list[Asked] = []
+    unsure: list[int] = []  # points of the search that were asked while more trials were out than told
     with _campaign(folder, script) as campaign:
         trials = campaign.study.trials
         while len(given) < count and len(campaign.trials) + len(campaign.pending) < trials:
+            blind = len(campaign.pending) > len(campaign.trials)
             asked = campaign.ask()
+            if blind and asked.phase == "search":
+                unsure.append(asked.number)
             try:
                 bench.lay_out(asked)
             except (DesignError, ExportError) as error:
@@ -107,6 +113,12 @@ def ask(
                     out.print(f"trial {asked.number} has failed without being flown: {error}\n")
             else:
                 given.append(asked)
+        if unsure:
+            warnings.warn(
+                f"asked in ignorance of the trials that are out, which are more than were told: {_numbers(unsure)}; "
+                "tell those first where you can",
+                stacklevel=1,
+            )
         if not given:
             pending_now = f", {len(campaign.pending)} of them are out" if campaign.pending else ""
             raise RunError(
@@ -223,6 +235,13 @@ def _print_asked(bench: Bench, asked: Asked, trials: int) -> None:
         lines["may end"] = f"early, once its J is above {asked.give_up:.4g}: tell the recording until then"
     for name, told in lines.items():
         out.print(f"{name:11} {told}")
+    out.print(_pulse(bench.study), end="")
+
+
+def _pulse(study: Study) -> str:
+    """A line of what disturbs the robot in each trial; nothing where nothing does."""
+    pulse = study.task.pulse
+    return f"disturbance {pulse.in_words}\n" if pulse else ""
 
 
 def _print_pending(result: Result, as_json: bool) -> None:
@@ -288,6 +307,11 @@ def _print_taken_back(campaign: Campaign, trial: Trial) -> None:
 
 def _left(told: int, pending: int, study: Study) -> str:
     return f"{told} of {study.trials} trials told, {pending} out, {study.trials - told - pending} to be asked"
+
+
+def _numbers(trials: list[int]) -> str:
+    first, last = trials[0], trials[-1]
+    return f"trial {first}" if first == last else f"trials {first} to {last}"
 
 
 def _quoted(path: Path) -> str:

@@ -238,6 +238,7 @@ def test_ask_says_what_to_do_next(at_the_bench, socasadi):
     socasadi("init", "study.py")
     said = socasadi("ask", "runs/study")
     assert said.startswith("trial 1 of 6, a seed point:")
+    assert "disturbance" not in said
     assert "frequency_y" in said
     assert "runs/study/asked/trial-001/controller_data.h, with the C in runs/study/controller-c" in said
     assert "CSV of 21 rows, t = 0 to 1 s every 0.05 s: t [s], y1 [m], y2 [m], u1 [N]" in said
@@ -248,6 +249,33 @@ def test_ask_says_what_to_do_next(at_the_bench, socasadi):
     for name, value in about["theta"].items():
         assert f"{name} = {value!r}" in header
     assert "\n\ntrial 3 of 6" in socasadi("ask", "runs/study", "--count", 2)
+
+
+def test_points_of_the_search_that_are_asked_in_ignorance_are_pointed_out(at_the_bench, socasadi, monkeypatch):
+    said = []
+    monkeypatch.setattr(cli.sys.stderr, "write", said.append)
+    socasadi("init", "study.py")
+    trials = asked(socasadi, "--count", 9)
+    assert len(trials) == 6
+    assert "asked in ignorance of the trials that are out, which are more than were told: trials 4 to 6" in "".join(
+        said
+    )
+    for trial in trials:
+        socasadi("tell", "runs/study", "--trial", trial["trial"], "--cost", 3.0 + trial["trial"])
+    said.clear()
+    socasadi("init", "study.py", "--resume", "--iterations", 5)
+    assert len(asked(socasadi, "--count", 2)) == 2
+    assert said == []
+
+
+def test_who_flies_is_told_of_the_force_that_disturbs_the_task(at_the_bench, socasadi):
+    text = Path("study.py").read_text()
+    Path("study.py").write_text(text.replace("period=2.0", "period=2.0, pulse=Pulse(0.5, 0.2, (0, 1.5, 0))"))
+    words = "at t = 0.5 s push the tip for 0.2 s with (0, 1.5, 0) N along x, y, z of the base"
+    assert f"\ndisturbance {words}" in socasadi("init", "study.py")
+    assert f"\ndisturbance {words}" in socasadi("ask", "runs/study")
+    assert f"In each trial, {words}" in Path("runs/study/controller-c/README.md").read_text()
+    assert asked(socasadi)[0]["pulse"] == {"time": 0.5, "duration": 0.2, "force": [0, 1.5, 0]}
 
 
 def test_a_recording_that_ends_early_counts_once_it_proves_enough(at_the_bench, socasadi):

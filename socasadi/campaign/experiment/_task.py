@@ -36,6 +36,15 @@ class Pulse:
         inside = self.time - 1e-9 <= time < self.time + self.duration - 1e-9
         return self.force if inside else (0.0, 0.0, 0.0)
 
+    @property
+    def in_words(self) -> str:
+        """What somebody has to do who applies it by hand."""
+        force = ", ".join(f"{value:g}" for value in self.force)
+        return (
+            f"at t = {self.time:g} s push the tip for {self.duration:g} s with ({force}) N along x, y, z of the base, "
+            "x along the arm at rest; the direction stays as the arm moves"
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class Task(ABC):
