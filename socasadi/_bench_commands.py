@@ -1,6 +1,7 @@
 """Commands of a campaign whose trials are flown by hand or by another program: init, ask, tell."""
 
 import json
+import math
 import shlex
 import warnings
 from dataclasses import replace
@@ -160,6 +161,8 @@ def tell(
         raise RunError("--measured goes with --cost; from a recording it is computed")
     if anyway and recording is None:
         raise RunError("--anyway goes with --csv: it takes a recording whose inputs are not the controller's")
+    if cost is not None and not math.isfinite(cost):
+        raise RunError(f"--cost takes a finite number, not {cost}; a trial that gave none is told by --failed REASON")
     if failed is not None and not failed.strip():
         raise RunError("--failed takes the reason, in a few words")
     values = _measured(measured or [])

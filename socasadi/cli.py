@@ -91,6 +91,9 @@ def show(
         return
     study, best = result.study, best_of(result)
     asked = sorted([*result.trials, *result.pending], key=lambda trial: trial.number)
+    if not asked:
+        out.print(result.begin)
+        return
     rows = [trial_row(trial, study, best=best is not None and trial.number == best.number) for trial in asked]
     out.print(table(rows, left=("phase", "outcome")))
     if study.limits:

@@ -186,6 +186,9 @@ def test_ctrl_c_says_how_to_go_on_and_going_on_finishes(tmp_path):
     ("arguments", "words"),
     [
         (("run", "nowhere.py"), "there is no study script nowhere.py"),
+        (("run", "."), ". is a folder; name the Python file that defines the study"),
+        (("run", "arm.toml"), "arm.toml is no Python file (.py); name the one that defines the study"),
+        (("check", "arm.toml"), "arm.toml is no Python file (.py); name the one that defines the study"),
         (("run", "empty.py"), "empty.py defines no `study`"),
         (("run", "unknown.py"), "no preset is called 'papre'; there are paper, hanging, paper_literal"),
         (("run", "crossing.py"), "input_bounds cross: lower 10 is not below upper -10"),
@@ -200,6 +203,7 @@ def test_ctrl_c_says_how_to_go_on_and_going_on_finishes(tmp_path):
 )
 def test_a_mistake_is_answered_by_one_sentence(tmp_path, arguments, words):
     (tmp_path / "empty.py").write_text("")
+    (tmp_path / "arm.toml").write_text("length = 0.6\n")
     (tmp_path / "broken.py").write_text("a = 1\nstuudy\n")
     (tmp_path / "syntax.py").write_text("study = (\n")
     (tmp_path / "beside.py").write_text("import empty\n")

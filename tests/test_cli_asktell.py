@@ -428,7 +428,10 @@ def test_a_robot_that_python_never_touches_cannot_be_run(at_the_bench, socasadi)
         (("init", "nowhere.py"), "there is no study script nowhere.py"),
         (("init", "study.py", "--real", "half", "--out", "x"), "unknown real 'half'; there are double, float"),
         (("tell", "runs/study", "--trial", 2, "--cost", 3), "trial 2 of runs/study was never asked; not told yet: 1"),
+        (("tell", "runs/study", "--trial", 2, "--cost", 3), "ask first: socasadi ask runs/study"),
         (("tell", "runs/study", "--trial", 1, "--cost", "nan"), "nan"),
+        (("tell", "runs/study", "--trial", 1, "--cost", "nan"), "is told by --failed REASON"),
+        (("plot", "runs/study"), "no trial of runs/study was told yet, 1 is out"),
         (("tell", "runs/study", "--trial", 1), "exactly one of --csv FILE, --cost J, --failed REASON and --take-back"),
         (("tell", "runs/study", "--trial", 1, "--cost", 3, "--csv", "a.csv"), "exactly one of --csv FILE, --cost J"),
         (("tell", "runs/study", "--trial", 1, "--csv", "nowhere.csv"), "there is no recording nowhere.csv"),
@@ -448,6 +451,26 @@ def test_a_mistake_is_answered_by_one_sentence_and_changes_nothing(at_the_bench,
     before = stored()
     assert words in socasadi(*arguments, refused=True)
     assert stored() == before
+
+
+@pytest.mark.parametrize("command", [("plot",), ("export", "--out", "c"), ("emulate",)])
+def test_a_run_without_trials_says_how_to_begin(at_the_bench, socasadi, command):
+    socasadi("init", "study.py")
+    words = "runs/study has no trials yet: ask and tell (socasadi ask runs/study)\n"
+    assert socasadi("show", "runs/study") == words
+    assert socasadi(command[0], "runs/study", *command[1:], refused=True) == f"socasadi: {words}"
+
+
+@pytest.mark.parametrize(("factor", "hinted"), [(1000, True), (1.5, False), (1e6, False)])
+def test_inputs_in_millinewtons_are_guessed(at_the_bench, socasadi, factor, hinted):
+    socasadi("init", "study.py")
+    (trial,) = asked(socasadi)
+    episode = flight(trial)
+    tension = factor * 8 * episode.tension / np.abs(episode.tension).max()
+    write_recording(replace(episode, tension=tension), "wrong.csv")
+    said = socasadi("tell", "runs/study", "--trial", 1, "--csv", "wrong.csv", refused=True)
+    assert "beyond its bounds -10 and 10 N" in said
+    assert ("is it in mN?" in said) == hinted
 
 
 def test_what_was_told_is_not_told_again(at_the_bench, socasadi):

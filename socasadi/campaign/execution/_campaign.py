@@ -1,3 +1,4 @@
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
@@ -278,9 +279,9 @@ class Campaign:
         if (asked := self._pending.get(number)) is None:
             told = any(trial.number == number for trial in self._trials)
             out = ", ".join(map(str, self._pending)) or "none"
-            raise RunError(
-                f"trial {number} of {self.folder} was {'told already' if told else 'never asked'}; not told yet: {out}"
-            )
+            was = "told already" if told else "never asked"
+            first = "" if told else f"; ask first: socasadi ask {shlex.quote(str(self.folder))}"
+            raise RunError(f"trial {number} of {self.folder} was {was}; not told yet: {out}{first}")
         return asked
 
     def _check_measured(self, number: int, measured: Mapping[str, float] | None) -> None:
