@@ -137,6 +137,12 @@ def plot(
     baseline = Result(result.study, beside).trials if beside.is_dir() else None
     for file in save_figures(figures(result, baseline, trial), run_folder / "figures"):
         out.print(str(file))
+    shown = result.best.number if trial is None else trial
+    if result.recorded(shown):
+        exported = result.chosen.number
+        of = " (the best observed)" if shown == result.best.number else ""
+        also = f"; exported is the controller of trial {exported}" if exported != shown else ""
+        out.print(f"drawn is the episode of trial {shown}{of}{also}")
 
 
 @app.command()

@@ -66,7 +66,9 @@ def test_show_plot_and_export_need_the_run_folder_alone(finished, tmp_path):
     assert "best" in shown.stdout
     assert "complete" in shown.stdout
     assert re.search(r"flown under fresh noise:.*\n.*\n +trial \d +1 ", shown.stdout)
-    assert socasadi("plot", run, "--trial", 2, cwd=tmp_path).returncode == 0
+    drawn = socasadi("plot", run, "--trial", 2, cwd=tmp_path)
+    assert drawn.returncode == 0
+    assert "drawn is the episode of trial 2" in drawn.stdout
     exported = socasadi("export", run, "--out", "c", cwd=tmp_path)
     assert exported.returncode == 0, exported.stderr
     assert (tmp_path / "c" / "controller.h").exists()
