@@ -27,8 +27,8 @@ def responses(episode: Episode, limits: Limits | None) -> Figure:
         axes.plot(
             episode.time, 1e3 * episode.reference[:, i], color=BLACK, ls="--", lw=0.9, label="reference", zorder=3
         )
-        axes.plot(episode.time, 1e3 * episode.output[:, i], color=GREY, lw=0.5, label="measured")
-        axes.plot(episode.time, 1e3 * episode.truth[:, i], color=BLUE, lw=1.1, label="true")
+        axes.plot(episode.time, 1e3 * episode.output[:, i], color="#BFBFBF", lw=3, label="measured")
+        axes.plot(episode.time, 1e3 * episode.truth[:, i], color=BLUE, lw=1, label="true")
         if limits is not None:
             for side, limit in enumerate(limits):
                 axes.axhline(1e3 * limit[i], color=ORANGE, ls=":", lw=1, label=None if side else "bounds")

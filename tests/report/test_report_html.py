@@ -107,6 +107,23 @@ def test_the_page_names_theta_with_units_and_where_it_is_likely(result, page):
         assert np.all(np.array(found["middle"]) <= np.array(found["high"]))
 
 
+def test_the_page_says_why_another_trial_than_the_best_is_exported(result, folder, page, monkeypatch):
+    words = "exported: trial"
+    assert (words in page) == (result.chosen.number != result.best.number)
+    other = next(trial for trial in result.trials if trial.number != result.best.number)
+    monkeypatch.setattr(Result, "chosen", other)
+    page = html_report(folder).read_text(encoding="utf-8")
+    assert f"trial {result.best.number}; {words} {other.number}, the best of those flown again" in page
+
+
+def test_a_heading_stands_as_the_cells_below_it(page):
+    for table in re.findall(r"<table.*?</table>", page, re.S):
+        heads = re.findall(r"<th scope=\"col\"([^>]*)>", table)
+        row = re.findall(r"<t[hd]([^>]*)>", re.split(r"<tbody>", table)[1].split("</tr>")[0])
+        for head, cell in list(zip(heads, row, strict=False))[1:]:  # the first ones are all at the left
+            assert ('class="left"' in head) == ('class="left"' in cell) or "findings" in table
+
+
 def test_an_estimate_that_says_nothing_gives_its_tile_no_number(result, folder, monkeypatch):
     worthless = Estimate(0, result.trials[0].theta, 3141.0, -1.0, 9e9)
     monkeypatch.setattr(Result, "best_estimated", worthless)

@@ -120,7 +120,10 @@ def _told(pieces: Pieces) -> dict[str, Any]:
     score = best.score if best else None
     tiles = []
     if best is not None:
-        tiles.append(("best J observed", f"{best.J:.4g}", f"trial {best.number}"))
+        about = f"trial {best.number}"
+        if pieces.chosen is not None and pieces.chosen.number != best.number:
+            about += f"; exported: trial {pieces.chosen.number}, the best of those flown again"
+        tiles.append(("best J observed", f"{best.J:.4g}", about))
     if pieces.estimate is not None:
         cost, sure = estimate_told(pieces.estimate, trials)
         tiles.append(("best J without noise, estimated", cost or "not known", sure))
