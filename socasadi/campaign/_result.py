@@ -87,9 +87,8 @@ class Result:
         folder = shlex.quote(str(self.folder))
         ask = f"ask and tell (socasadi ask {folder})"
         if out := len(self.pending):
-            return (
-                f"no trial of {self.folder} was told yet, {out} {'is' if out == 1 else 'are'} out: tell what came of it"
-            )
+            are, them = ("is", "it") if out == 1 else ("are", "them")
+            return f"no trial of {self.folder} was told yet, {out} {are} out: tell what came of {them} (socasadi tell)"
         if isinstance(self.study.plant, ExternalPlant):
             return f"{self.folder} has no trials yet: {ask}"
         return f"{self.folder} has no trials yet: run it (socasadi run STUDY --out {folder} --resume), or {ask}"
