@@ -1,7 +1,9 @@
 """Commands of a campaign whose trials are flown by hand or by another program: init, ask, tell."""
 
 import json
+import math
 import shlex
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -76,6 +78,7 @@ def init(
     out.print(
         f"{folder}: {study.trials} trials of {study.task.duration:g} s\n"
         f"controller  {bench.sources}: the C that no trial changes, see its README.md\n"
+        f"{_pulse(study)}"
         f"next        socasadi ask {_quoted(folder)}{again}"
     )
 
@@ -97,10 +100,14 @@ def ask(
     bench = Bench.of(opened(folder, script).study, folder)
     _check_compiler(bench.real)
     given: list[Asked] = []
+    unsure: list[int] = []  # points of the search that were asked while more trials were out than told
     with _campaign(folder, script) as campaign:
         trials = campaign.study.trials
         while len(given) < count and len(campaign.trials) + len(campaign.pending) < trials:
+            blind = len(campaign.pending) > len(campaign.trials)
             asked = campaign.ask()
+            if blind and asked.phase == "search":
+                unsure.append(asked.number)
             try:
                 bench.lay_out(asked)
             except (DesignError, ExportError) as error:
@@ -109,6 +116,12 @@ def ask(
                     out.print(f"trial {asked.number} has failed without being flown: {error}\n")
             else:
                 given.append(asked)
+        if unsure:
+            warnings.warn(
+                f"asked in ignorance of the trials that are out, which are more than were told: {_numbers(unsure)}; "
+                "tell those first where you can",
+                stacklevel=1,
+            )
         if not given:
             pending_now = f", {len(campaign.pending)} of them are out" if campaign.pending else ""
             raise RunError(
@@ -150,6 +163,8 @@ def tell(
         raise RunError("--measured goes with --cost; from a recording it is computed")
     if anyway and recording is None:
         raise RunError("--anyway goes with --csv: it takes a recording whose inputs are not the controller's")
+    if cost is not None and not math.isfinite(cost):
+        raise RunError(f"--cost takes a finite number, not {cost}; a trial that gave none is told by --failed REASON")
     if failed is not None and not failed.strip():
         raise RunError("--failed takes the reason, in a few words")
     values = _measured(measured or [])
@@ -225,6 +240,13 @@ def _print_asked(bench: Bench, asked: Asked, trials: int) -> None:
         lines["may end"] = f"early, once its J is above {asked.give_up:.4g}: tell the recording until then"
     for name, told in lines.items():
         out.print(f"{name:11} {told}")
+    out.print(_pulse(bench.study), end="")
+
+
+def _pulse(study: Study) -> str:
+    """A line of what disturbs the robot in each trial; nothing where nothing does."""
+    pulse = study.task.pulse
+    return f"disturbance {pulse.in_words}\n" if pulse else ""
 
 
 def _print_pending(result: Result, as_json: bool) -> None:
@@ -290,6 +312,11 @@ def _print_taken_back(campaign: Campaign, trial: Trial) -> None:
 
 def _left(told: int, pending: int, study: Study) -> str:
     return f"{told} of {study.trials} trials told, {pending} out, {study.trials - told - pending} to be asked"
+
+
+def _numbers(trials: list[int]) -> str:
+    first, last = trials[0], trials[-1]
+    return f"trial {first}" if first == last else f"trials {first} to {last}"
 
 
 def _quoted(path: Path) -> str:

@@ -34,6 +34,7 @@ from .campaign import (
     RunError,
     Study,
     assess,
+    check_run,
     clock,
     dask_executor,
     interruptible,
@@ -66,6 +67,7 @@ def run(
         given["initial"] = (*(_best_theta(study, earlier) for earlier in start), *study.initial)
     study = replace(study, **{name: value for name, value in given.items() if value is not None})
     folder = folder or Path("runs") / script.stem
+    check_run(study, folder, resume=resume)
     out.print(f"{script}: {study.trials} trials of {study.task.duration:g} s, into {folder}")
     checked = check(study, quick=True)
     against = checked.objections

@@ -23,6 +23,7 @@ from .campaign import (
     Verdict,
     bound_notes,
     clock,
+    estimate_told,
     load_study,
     read_probe,
     verdict_row,
@@ -149,8 +150,9 @@ def estimated(result: Result) -> str:
     """The best trial without the luck of its noise, in a line; nothing before there is one."""
     if (estimate := result.best_estimated) is None:
         return ""
-    trial, between = result.trials[estimate.index], f"{estimate.low:.4g} to {estimate.high:.4g}"
-    return f"best without noise, as estimated: J = {estimate.cost:.4g} (90 %: {between}), trial {trial.number}"
+    cost, sure = estimate_told(estimate, result.trials)
+    number = result.trials[estimate.index].number
+    return f"best without noise, as estimated: J = {cost} ({sure}), trial {number}" if cost else sure
 
 
 def print_chosen(result: Result) -> None:

@@ -1,5 +1,6 @@
 """The command ``socasadi``."""
 
+import importlib.metadata
 import sys
 import warnings
 from io import TextIOWrapper
@@ -44,11 +45,26 @@ from .export import ExportError
 from .plant import ExternalPlantError
 
 app = typer.Typer(
-    help="Tune a soft robot's model predictive controller in closed loop, and get it as C.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"socasadi {importlib.metadata.version('socasadi')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _about(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Tune a soft robot's model predictive controller in closed loop, and get it as C."""
+
 
 app.command(name="check")(check_)
 for command in (run, init, ask, tell, compare):
@@ -75,6 +91,9 @@ def show(
         return
     study, best = result.study, best_of(result)
     asked = sorted([*result.trials, *result.pending], key=lambda trial: trial.number)
+    if not asked:
+        out.print(result.begin)
+        return
     rows = [trial_row(trial, study, best=best is not None and trial.number == best.number) for trial in asked]
     out.print(table(rows, left=("phase", "outcome")))
     if study.limits:
@@ -118,6 +137,12 @@ def plot(
     baseline = Result(result.study, beside).trials if beside.is_dir() else None
     for file in save_figures(figures(result, baseline, trial), run_folder / "figures"):
         out.print(str(file))
+    shown = result.best.number if trial is None else trial
+    if result.recorded(shown):
+        exported = result.chosen.number
+        of = " (the best observed)" if shown == result.best.number else ""
+        also = f"; exported is the controller of trial {exported}" if exported != shown else ""
+        out.print(f"drawn is the episode of trial {shown}{of}{also}")
 
 
 @app.command()
@@ -131,14 +156,18 @@ def report(
     record: RobotRecord = None,
 ) -> None:
     """Write a run as one HTML file that opens from disk: all its figures, and the rod moving."""
-    from .report import html_report
+    from .report import write_report
 
     with out.status("reporting"):
         study = None if script is None else opened(run_folder, script).study
         told = spec is not None or record is not None
         found = checked(study or opened(run_folder, None).study, spec, record) if told else None
-        written = html_report(run_folder, file, study, found)
-    out.print(f"{written}: {written.stat().st_size / 1e6:.1f} MB, for any browser")
+        written = write_report(run_folder, file, study, found)
+    out.print(f"{written.file}: {written.file.stat().st_size / 1e6:.1f} MB, for any browser")
+    if written.lacks:
+        print("What this report lacks:", *written.lacks, sep="\n  ", file=sys.stderr)
+    if written.damaged:
+        raise typer.Exit(1)
 
 
 @app.command()

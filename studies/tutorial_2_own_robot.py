@@ -185,8 +185,9 @@ def main() -> None:
     # best costs 7.7. Without the probing record forty trials in the data sheet's box come to 7.7, too; the first eight
     # of them had come to 10.3. So probe first where you can; the search is for what a linear fit of 20 s does not see.
     #
-    # The best of noisy costs is also the luckiest: "as estimated" takes that out. Fly the exported controller a few
-    # times more before you quote its J.
+    # The best of noisy costs is also the luckiest. With more trials `show` says what it is worth without that luck;
+    # eight in ten parameters are too few, and it says so. Fly the exported controller a few times more before you quote
+    # its J.
 
     shell("socasadi show runs/arm --csv trials.csv")
     shell("socasadi show runs/arm")

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -65,10 +66,33 @@ def test_show_plot_and_export_need_the_run_folder_alone(finished, tmp_path):
     assert "best" in shown.stdout
     assert "complete" in shown.stdout
     assert re.search(r"flown under fresh noise:.*\n.*\n +trial \d +1 ", shown.stdout)
-    assert socasadi("plot", run, "--trial", 2, cwd=tmp_path).returncode == 0
+    drawn = socasadi("plot", run, "--trial", 2, cwd=tmp_path)
+    assert drawn.returncode == 0
+    assert "drawn is the episode of trial 2" in drawn.stdout
     exported = socasadi("export", run, "--out", "c", cwd=tmp_path)
     assert exported.returncode == 0, exported.stderr
     assert (tmp_path / "c" / "controller.h").exists()
+
+
+def test_it_tells_its_version(tmp_path):
+    told = socasadi("--version", cwd=tmp_path)
+    assert (told.returncode, told.stdout) == (0, f"socasadi {version('socasadi')}\n")
+
+
+def test_report_says_what_it_lacks_and_fails_on_damage_alone(finished, tmp_path):
+    folder, _ = finished
+    run = shutil.copytree(folder / "runs" / "study", tmp_path / "run")
+    whole = socasadi("report", run, cwd=tmp_path)
+    assert (whole.returncode, whole.stderr) == (0, "")
+    shutil.rmtree(run / "sobol")
+    without = socasadi("report", run, cwd=tmp_path)
+    assert without.returncode == 0
+    assert without.stderr.startswith("What this report lacks:\n  the Sobol baseline: there is no ")
+    (run / "journal.sqlite").write_bytes((run / "journal.sqlite").read_bytes()[:9000])
+    damaged = socasadi("report", run, cwd=tmp_path)
+    assert damaged.returncode == 1
+    assert "report.html: " in damaged.stdout
+    assert "\n  the journal: " in damaged.stderr
 
 
 def test_show_draws_the_costs_and_says_where_things_lie(finished):
@@ -164,6 +188,9 @@ def test_ctrl_c_says_how_to_go_on_and_going_on_finishes(tmp_path):
     ("arguments", "words"),
     [
         (("run", "nowhere.py"), "there is no study script nowhere.py"),
+        (("run", "."), ". is a folder; name the Python file that defines the study"),
+        (("run", "arm.toml"), "arm.toml is no Python file (.py); name the one that defines the study"),
+        (("check", "arm.toml"), "arm.toml is no Python file (.py); name the one that defines the study"),
         (("run", "empty.py"), "empty.py defines no `study`"),
         (("run", "unknown.py"), "no preset is called 'papre'; there are paper, hanging, paper_literal"),
         (("run", "crossing.py"), "input_bounds cross: lower 10 is not below upper -10"),
@@ -178,6 +205,7 @@ def test_ctrl_c_says_how_to_go_on_and_going_on_finishes(tmp_path):
 )
 def test_a_mistake_is_answered_by_one_sentence(tmp_path, arguments, words):
     (tmp_path / "empty.py").write_text("")
+    (tmp_path / "arm.toml").write_text("length = 0.6\n")
     (tmp_path / "broken.py").write_text("a = 1\nstuudy\n")
     (tmp_path / "syntax.py").write_text("study = (\n")
     (tmp_path / "beside.py").write_text("import empty\n")
@@ -246,6 +274,11 @@ def test_a_run_folder_that_exists_needs_resume_and_the_same_settings(finished):
     other = socasadi("run", "study.py", "--resume", "--seed", 5, cwd=folder)
     assert other.returncode == 1
     assert "other settings: seed was 0 and is 5" in other.stderr
+    fewer = socasadi("run", "study.py", "--resume", "--iterations", 1, cwd=folder)
+    assert fewer.returncode == 1
+    assert "holds 6 trials already; ask for no fewer, not for 5" in fewer.stderr
+    # Before anything else is done or said.
+    assert again.stdout + other.stdout + fewer.stdout == ""
 
 
 def test_what_the_readme_and_the_guide_show_of_python_runs(tmp_path):

@@ -73,6 +73,7 @@ def socasadi(capsys, monkeypatch):
             assert ended.value.code == 1
             assert said.err.startswith("socasadi: ")
             assert len(said.err.strip().splitlines()) == 1, said.err
+            assert not said.out
             return said.err
         assert not ended.value.code, said.err
         return said.out
@@ -237,6 +238,7 @@ def test_ask_says_what_to_do_next(at_the_bench, socasadi):
     socasadi("init", "study.py")
     said = socasadi("ask", "runs/study")
     assert said.startswith("trial 1 of 6, a seed point:")
+    assert "disturbance" not in said
     assert "frequency_y" in said
     assert "runs/study/asked/trial-001/controller_data.h, with the C in runs/study/controller-c" in said
     assert "CSV of 21 rows, t = 0 to 1 s every 0.05 s: t [s], y1 [m], y2 [m], u1 [N]" in said
@@ -247,6 +249,33 @@ def test_ask_says_what_to_do_next(at_the_bench, socasadi):
     for name, value in about["theta"].items():
         assert f"{name} = {value!r}" in header
     assert "\n\ntrial 3 of 6" in socasadi("ask", "runs/study", "--count", 2)
+
+
+def test_points_of_the_search_that_are_asked_in_ignorance_are_pointed_out(at_the_bench, socasadi, monkeypatch):
+    said = []
+    monkeypatch.setattr(cli.sys.stderr, "write", said.append)
+    socasadi("init", "study.py")
+    trials = asked(socasadi, "--count", 9)
+    assert len(trials) == 6
+    assert "asked in ignorance of the trials that are out, which are more than were told: trials 4 to 6" in "".join(
+        said
+    )
+    for trial in trials:
+        socasadi("tell", "runs/study", "--trial", trial["trial"], "--cost", 3.0 + trial["trial"])
+    said.clear()
+    socasadi("init", "study.py", "--resume", "--iterations", 5)
+    assert len(asked(socasadi, "--count", 2)) == 2
+    assert said == []
+
+
+def test_who_flies_is_told_of_the_force_that_disturbs_the_task(at_the_bench, socasadi):
+    text = Path("study.py").read_text()
+    Path("study.py").write_text(text.replace("period=2.0", "period=2.0, pulse=Pulse(0.5, 0.2, (0, 1.5, 0))"))
+    words = "at t = 0.5 s push the tip for 0.2 s with (0, 1.5, 0) N along x, y, z of the base"
+    assert f"\ndisturbance {words}" in socasadi("init", "study.py")
+    assert f"\ndisturbance {words}" in socasadi("ask", "runs/study")
+    assert f"In each trial, {words}" in Path("runs/study/controller-c/README.md").read_text()
+    assert asked(socasadi)[0]["pulse"] == {"time": 0.5, "duration": 0.2, "force": [0, 1.5, 0]}
 
 
 def test_a_recording_that_ends_early_counts_once_it_proves_enough(at_the_bench, socasadi):
@@ -399,7 +428,10 @@ def test_a_robot_that_python_never_touches_cannot_be_run(at_the_bench, socasadi)
         (("init", "nowhere.py"), "there is no study script nowhere.py"),
         (("init", "study.py", "--real", "half", "--out", "x"), "unknown real 'half'; there are double, float"),
         (("tell", "runs/study", "--trial", 2, "--cost", 3), "trial 2 of runs/study was never asked; not told yet: 1"),
+        (("tell", "runs/study", "--trial", 2, "--cost", 3), "ask first: socasadi ask runs/study"),
         (("tell", "runs/study", "--trial", 1, "--cost", "nan"), "nan"),
+        (("tell", "runs/study", "--trial", 1, "--cost", "nan"), "is told by --failed REASON"),
+        (("plot", "runs/study"), "no trial of runs/study was told yet, 1 is out"),
         (("tell", "runs/study", "--trial", 1), "exactly one of --csv FILE, --cost J, --failed REASON and --take-back"),
         (("tell", "runs/study", "--trial", 1, "--cost", 3, "--csv", "a.csv"), "exactly one of --csv FILE, --cost J"),
         (("tell", "runs/study", "--trial", 1, "--csv", "nowhere.csv"), "there is no recording nowhere.csv"),
@@ -419,6 +451,26 @@ def test_a_mistake_is_answered_by_one_sentence_and_changes_nothing(at_the_bench,
     before = stored()
     assert words in socasadi(*arguments, refused=True)
     assert stored() == before
+
+
+@pytest.mark.parametrize("command", [("plot",), ("export", "--out", "c"), ("emulate",)])
+def test_a_run_without_trials_says_how_to_begin(at_the_bench, socasadi, command):
+    socasadi("init", "study.py")
+    words = "runs/study has no trials yet: ask and tell (socasadi ask runs/study)\n"
+    assert socasadi("show", "runs/study") == words
+    assert socasadi(command[0], "runs/study", *command[1:], refused=True) == f"socasadi: {words}"
+
+
+@pytest.mark.parametrize(("factor", "hinted"), [(1000, True), (1.5, False), (1e6, False)])
+def test_inputs_in_millinewtons_are_guessed(at_the_bench, socasadi, factor, hinted):
+    socasadi("init", "study.py")
+    (trial,) = asked(socasadi)
+    episode = flight(trial)
+    tension = factor * 8 * episode.tension / np.abs(episode.tension).max()
+    write_recording(replace(episode, tension=tension), "wrong.csv")
+    said = socasadi("tell", "runs/study", "--trial", 1, "--csv", "wrong.csv", refused=True)
+    assert "beyond its bounds -10 and 10 N" in said
+    assert ("is it in mN?" in said) == hinted
 
 
 def test_what_was_told_is_not_told_again(at_the_bench, socasadi):

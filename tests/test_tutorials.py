@@ -78,6 +78,10 @@ def test_the_second_brings_a_campaign_to_its_end_and_refuses_to_begin_over_it(tm
     assert "taken back" in said(done.stdout, "socasadi tell runs/arm --trial 4 --take-back")
     assert "trial 8" in said(done.stdout, "socasadi tell runs/arm --trial 8 --csv recording-8.csv")
 
+    told = said(done.stdout, "socasadi show runs/arm")
+    assert "too few trials to say what the best is worth without noise" in told
+    assert "as estimated" not in told
+
     result = Result.open(tmp_path / "lab" / "runs" / "arm")
     assert result.complete
     trials = {trial.number: trial for trial in result.trials}

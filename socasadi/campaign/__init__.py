@@ -5,12 +5,13 @@ from ._bench import Bench
 from ._emulate import ProcessorInTheLoop, emulate
 from ._result import Result
 from ._study import Study
-from ._table import bound_notes, told_outcome, trial_row, trials_csv, verdict_row
+from ._table import bound_notes, estimate_told, told_outcome, trial_row, trials_csv, verdict_row
 from .execution import (
     Campaign,
     DaskExecutor,
     Processes,
     Progress,
+    check_run,
     clock,
     dask_executor,
     fly_once,
@@ -91,9 +92,11 @@ __all__ = [
     "assess",
     "assessed",
     "bound_notes",
+    "check_run",
     "clock",
     "dask_executor",
     "emulate",
+    "estimate_told",
     "fly",
     "fly_once",
     "interruptible",

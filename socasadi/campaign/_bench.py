@@ -1,7 +1,7 @@
 """What somebody who flies a trial by hand is given: theta, the controller's numbers, and the C that they belong to."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -125,9 +125,12 @@ class Bench:
             "sample_time": self.study.mpc.sample_time,
             "samples": self.samples,
             "columns": self.columns,
+            "pulse": asdict(self.study.task.pulse) if self.study.task.pulse else None,
         }
 
     def _write_sources(self, theta: np.ndarray) -> None:
         mpc, task = self.study.mpc.at(theta), self.study.task
         instants = mpc.sample_time * np.arange(self.samples + 1 + mpc.reference_rows)
-        export_sources(mpc, self.study.mpc.system(theta), task.reference(instants), self.sources, real=self.real)
+        system, reference = self.study.mpc.system(theta), task.reference(instants)
+        note = f"In each trial, {task.pulse.in_words}." if task.pulse else ""
+        export_sources(mpc, system, reference, self.sources, real=self.real, note=note)

@@ -1,5 +1,6 @@
 import functools
 import hashlib
+import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -7,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..export import ControllerRecord, export
+from ..plant import ExternalPlant
 from ..tune import Estimate, Optimizer, Sensitivity
 from ._provenance import provenance
 from .execution import best_trial, flown_cost, keeps_limits, replayed
@@ -72,10 +74,24 @@ class Result:
     def best(self) -> Trial:
         """The best observed: of least J among those that kept all limits; RunError when none did."""
         best = best_trial(self.trials, self.study)
+        if best is None and not self.trials:
+            raise RunError(self.begin)
         if best is None:
             reasons = "; ".join(self._why_none_succeeded()[:3])
             raise RunError(f"none of the {len(self.trials)} trials in {self.folder} succeeded: {reasons}")
         return best
+
+    @property
+    def begin(self) -> str:
+        """What to do with a run of which nothing was told yet, in a sentence."""
+        folder = shlex.quote(str(self.folder))
+        ask = f"ask and tell (socasadi ask {folder})"
+        if out := len(self.pending):
+            are, them = ("is", "it") if out == 1 else ("are", "them")
+            return f"no trial of {self.folder} was told yet, {out} {are} out: tell what came of {them} (socasadi tell)"
+        if isinstance(self.study.plant, ExternalPlant):
+            return f"{self.folder} has no trials yet: {ask}"
+        return f"{self.folder} has no trials yet: run it (socasadi run STUDY --out {folder} --resume), or {ask}"
 
     @functools.cached_property
     def best_estimated(self) -> Estimate | None:
@@ -126,7 +142,7 @@ class Result:
         if done and not broken:
             broken = [f"none kept all of {', '.join(limit.name for limit in self.study.limits)} at once"]
         failures = sorted({trial.failure for trial in self.trials if trial.failure})
-        return broken + failures or [f"none was told, {len(self.pending)} are out" if self.pending else "none was made"]
+        return broken + failures
 
     def kept(self, trial: Trial) -> bool:
         """Whether a trial is done and kept all limits of the study."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model import Entry
-from ..tune import Space
+from ..tune import Estimate, Space
 from ._assess import Verdict
 from ._result import Result
 from .experiment import Limit, Units
@@ -130,6 +130,18 @@ def verdict_row(verdict: Verdict, study: Study) -> dict[str, str]:
         **({"broke a limit": str(verdict.broken)} if study.limits else {}),
         f"open-loop error / {unit}": f"{error:.2f}" if np.isfinite(error) else "-",
     }
+
+
+def estimate_told(estimate: Estimate, trials: Sequence[Trial]) -> tuple[str, str]:
+    """What is believed of the best J without noise, as it is told to people: J, and how sure that is.
+
+    No J where its interval says nothing: an end of it is below what a sum of squares can be, or it is as wide as the
+    costs are spread that it was made of.
+    """
+    spread = np.std([trial.J for trial in trials if trial.J is not None])
+    if estimate.low <= 0 or estimate.high - estimate.low > spread:
+        return "", "too few trials to say what the best is worth without noise"
+    return f"{estimate.cost:.4g}", f"90 %: {estimate.low:.4g} to {estimate.high:.4g}"
 
 
 def bound_notes(entries: Sequence[Entry], theta: np.ndarray) -> list[str]:

@@ -90,6 +90,7 @@ def export_sources(
     *,
     real: str = "double",
     name: str = "controller",
+    note: str = "",
 ) -> Path:
     """Write what flies experiments with a controller, without the numbers of any: they come as NAME_data.h.
 
@@ -105,6 +106,8 @@ def export_sources(
         (samples + 1 + mpc.reference_rows, p) what is wanted at t = 0, 1, ... samples.
     folder
         Made when it is not there; what an earlier call wrote there is replaced.
+    note
+        What else is to be known of the experiment, for its README.md.
 
     Raises
     ------
@@ -126,6 +129,7 @@ def export_sources(
         **controller_facts(mpc, kind, given, ()),
         "samples": samples,
         "reference": reference,
+        "note": note,
         "sources": [*(file for file in files if file.endswith(".c")), f"{name}.c"],
     }
     templates = environment(real)

@@ -6,7 +6,7 @@ from ._convergence import best_so_far, cost_axis
 from ._figures import figures, save_figures
 from ._reach import reach_figure
 from ._style import BLACK, BLUE, COLUMN, GREY, MM, ORANGE, SETTINGS, legend_above, page
-from .html import html_report
+from .html import Report, html_report, write_report
 
 __all__ = [
     "BLACK",
@@ -16,6 +16,7 @@ __all__ = [
     "MM",
     "ORANGE",
     "SETTINGS",
+    "Report",
     "animate",
     "best_so_far",
     "comparison_figures",
@@ -26,4 +27,5 @@ __all__ = [
     "page",
     "reach_figure",
     "save_figures",
+    "write_report",
 ]

@@ -11,6 +11,9 @@ from ._style import BLACK, BLUE, COLUMN, GREY, MM, ORANGE, legend_above, page
 # Costs above this multiple of the best are not resolved.
 _HIGHEST = 30
 
+# Of the many points, on which lines, the star and its number can be read, in grey, too.
+_PALE = "#9CCBE6"
+
 
 def convergence(trials: list[Trial], kept: Callable[[Trial], bool], baseline: list[Trial] | None = None) -> Figure:
     """Cost of each trial and the best so far of those that are ``kept``; the baseline's best so far beside it.
@@ -24,7 +27,7 @@ def convergence(trials: list[Trial], kept: Callable[[Trial], bool], baseline: li
     told = [(place, trial, trial.at_least if trial.J is None else trial.J) for place, trial in enumerate(trials, 1)]
     kinds = {
         "seed point": ("s", "white", BLUE, [(n, J) for n, t, J in told if kept(t) and t.phase == "seed"]),
-        "search": ("o", BLUE, BLUE, [(n, J) for n, t, J in told if kept(t) and t.phase == "search"]),
+        "search": ("o", _PALE, _PALE, [(n, J) for n, t, J in told if kept(t) and t.phase == "search"]),
         "broke a limit": ("D", "white", ORANGE, [(n, J) for n, t, J in told if t.J is not None and not kept(t)]),
         "cut: J is above": ("^", "white", GREY, [(n, J) for n, t, J in told if t.at_least is not None]),
     }
@@ -49,25 +52,25 @@ def convergence(trials: list[Trial], kept: Callable[[Trial], bool], baseline: li
             where="post",
             color=ORANGE,
             ls="--",
+            lw=1.3,
             label="best of Sobol points",
             zorder=3,
         )
     if np.isfinite(incumbent).any():
         best = int(np.nanargmin(incumbent))
-        axes.plot(best + 1, incumbent[best], "*", color=ORANGE, ms=9, mec="white", mew=0.5, zorder=5)
-        # Above and to the left, where the trials before were worse.
+        axes.plot(best + 1, incumbent[best], "*", color=ORANGE, ms=10, mec=BLACK, mew=0.7, zorder=5)
+        # Below, where no trial is.
         right = best > len(trials) / 2
         axes.annotate(
-            f"{incumbent[best]:.3g}",
+            f"{incumbent[best]:.3g}, trial {trials[best].number}",
             (best + 1, incumbent[best]),
-            xytext=(-4 if right else 4, -11),
+            xytext=(5 if right else -5, -15),
             textcoords="offset points",
             ha="right" if right else "left",
-            color=ORANGE,
         )
     if known:
         highest = max(J for _, _, J in told if J is not None and ceiling >= J)
-        axes.set_ylim(min(known) / 1.5, min(1.3 * highest, ceiling))
+        axes.set_ylim(min(known) / 2, min(1.3 * highest, ceiling))
     axes.set_xlim(0, max(len(trials), len(baseline or [])) + 2)
     legend_above(axes, 3)
     return figure

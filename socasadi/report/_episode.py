@@ -27,8 +27,8 @@ def responses(episode: Episode, limits: Limits | None) -> Figure:
         axes.plot(
             episode.time, 1e3 * episode.reference[:, i], color=BLACK, ls="--", lw=0.9, label="reference", zorder=3
         )
-        axes.plot(episode.time, 1e3 * episode.output[:, i], color=GREY, lw=0.5, label="measured")
-        axes.plot(episode.time, 1e3 * episode.truth[:, i], color=BLUE, lw=1.1, label="true")
+        axes.plot(episode.time, 1e3 * episode.output[:, i], color="#BFBFBF", lw=3, label="measured")
+        axes.plot(episode.time, 1e3 * episode.truth[:, i], color=BLUE, lw=1, label="true")
         if limits is not None:
             for side, limit in enumerate(limits):
                 axes.axhline(1e3 * limit[i], color=ORANGE, ls=":", lw=1, label=None if side else "bounds")
@@ -63,15 +63,18 @@ def inputs(episode: Episode, limits: Limits) -> Figure:
     """Tensions over time with their bounds."""
     figure, (axes,) = page(COLUMN, 58 * MM)
     start = episode.time[:-1]
+    k = _apart(episode.tension)
     for j in range(episode.tension.shape[1]):
         colour, dashes = INPUT_COLOURS[j % len(INPUT_COLOURS)], INPUT_DASHES[j % len(INPUT_DASHES)]
         axes.step(start, episode.tension[:, j], where="post", color=colour, ls=dashes, label=f"cable {j + 1}")
+        around = {"boxstyle": "circle,pad=0.15", "fc": "white", "ec": colour, "lw": 0.6}
+        axes.text(start[k], episode.tension[k, j], str(j + 1), ha="center", va="center", fontsize=6, bbox=around)
     for i, limit in enumerate(sorted({float(value) for side in limits for value in side})):
         axes.axhline(limit, color=GREY, ls=":", lw=1, label=None if i else "bounds")
     axes.set_xlabel("time / s")
     axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.set_ylabel("tension / N")
-    axes.margins(x=0)
+    axes.set_xlim(0, episode.time[-1])
     legend_above(axes, 4)
     return figure
 
@@ -108,6 +111,13 @@ def shapes(episode: Episode, instants: int = 6) -> Figure | None:
     figure.subplots_adjust(left=0.08, right=0.92, bottom=0.04, top=1.0)
     figure.legend(loc="upper left", ncols=1)
     return figure
+
+
+def _apart(values: np.ndarray) -> int:
+    """The row, not close to an end, in which the closest two of the values (k, m) are farthest apart."""
+    low, high = len(values) // 10, max(len(values) - len(values) // 10, 1)
+    gaps = np.diff(np.sort(values, axis=1), axis=1).min(axis=1, initial=np.inf)
+    return low + int(np.argmax(gaps[low:high]))
 
 
 def _far_apart(points: np.ndarray, count: int) -> list[int]:

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from ..campaign import Result, Trial
 from ._convergence import convergence
 from ._episode import inputs, path, responses, shapes
-from ._style import SETTINGS
+from ._style import SETTINGS, note_trial
 
 
 def figures(result: Result, baseline: list[Trial] | None = None, trial: int | None = None) -> dict[str, Figure]:
@@ -24,13 +24,18 @@ def figures(result: Result, baseline: list[Trial] | None = None, trial: int | No
         drawn: dict[str, Figure | None] = {"convergence": convergence(result.trials, result.kept, baseline)}
         if trial is None and not result.recorded(result.best.number):
             return {name: figure for name, figure in drawn.items() if figure is not None}
-        episode = result.episode(result.best.number if trial is None else trial)
-        drawn |= {
+        number = result.best.number if trial is None else trial
+        episode = result.episode(number)
+        flown = {
             "responses": responses(episode, mpc.output_limits),
             "path": path(episode) if mpc.outputs == 2 else None,
             "inputs": inputs(episode, mpc.input_limits),
             "shapes": shapes(episode),
         }
+        for figure in flown.values():
+            if figure is not None:
+                note_trial(figure, number)
+        drawn |= flown
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
 

@@ -107,7 +107,7 @@ def _write_gif(frames: Iterable[np.ndarray], rate: float, file: Path) -> None:
 
 def _palette() -> list[int]:
     """Red, green, blue of less than 256 colours: one is left for what does not change between frames."""
-    colours = np.array([to_rgb(colour) for colour in (BLACK, GREY, *INPUT_COLOURS)])
+    colours = np.array([to_rgb(colour) for colour in dict.fromkeys((BLACK, GREY, *INPUT_COLOURS))])
     share = np.linspace(0, 0.85, _SHADES)[:, None, None]  # Pillow would take what is closer to white for white
     shades = np.rint(255 * ((1 - share) * colours + share)).astype(int)
     return [*shades.ravel().tolist(), 255, 255, 255]

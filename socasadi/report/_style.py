@@ -9,10 +9,12 @@ MM = 1 / 25.4
 COLUMN = 88 * MM
 PAGE = 180 * MM
 
-# Okabe and Ito's palette, told apart by the colour-blind; lightness falls along it, so in grey too with the dashes.
-BLUE, ORANGE, GREEN, GREY, BLACK = "#0072B2", "#D55E00", "#009E73", "#7F7F7F", "#000000"
-INPUT_COLOURS = (BLUE, ORANGE, GREEN, "#CC79A7", "#56B4E9", "#E69F00")
-INPUT_DASHES = ("-", (0, (5, 1.5)), (0, (2, 1)), (0, (5, 1, 1, 1)), (0, (1, 1)), "-.")
+# Okabe and Ito's palette, told apart by the colour-blind.
+BLUE, ORANGE, GREY, BLACK = "#0072B2", "#D55E00", "#7F7F7F", "#000000"
+# In grey, too: of the first three inputs, and of the others, each is much lighter than another. Short dashes would
+# drown in the steps of an input.
+INPUT_COLOURS = (BLUE, "#E69F00", BLACK, "#56B4E9", ORANGE, "#004B7A")
+INPUT_DASHES = ("-", "-", "-", (0, (6, 2)), (0, (6, 2)), (0, (6, 2)))
 
 SETTINGS: dict[Any, Any] = {
     "font.size": 8,
@@ -38,6 +40,11 @@ def page(width: float, height: float, rows: int = 1) -> tuple[Figure, list[Axes]
     figure = Figure(figsize=(width, height))
     axes = figure.subplots(rows, 1, sharex=True, squeeze=False)
     return figure, list(axes[:, 0])
+
+
+def note_trial(figure: Figure, number: int) -> None:
+    """Say in a corner of a figure which trial it shows."""
+    figure.text(0.99, 0.012, f"trial {number}", ha="right", va="bottom", fontsize=6, color="#555555")
 
 
 def legend_above(axes: Axes, columns: int) -> None:

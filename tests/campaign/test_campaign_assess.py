@@ -6,8 +6,19 @@ from math import inf
 import numpy as np
 import pytest
 
-from socasadi.campaign import Campaign, Flight, Journal, MeasuredLimit, Result, RunError, assess, assessed
+from socasadi.campaign import (
+    Campaign,
+    Flight,
+    Journal,
+    MeasuredLimit,
+    Result,
+    RunError,
+    assess,
+    assessed,
+    estimate_told,
+)
 from socasadi.plant import PlantFailure
+from socasadi.tune import Estimate
 
 
 def test_no_verification_is_flown_twice(toy_study, tmp_path):
@@ -81,6 +92,18 @@ def test_the_best_that_is_estimated_is_flown_beside_the_best_observed_and_the_be
     better = min(rivals, key=lambda verdict: verdict.J.mean())
     assert result.chosen.theta.tolist() == better.theta.tolist()
     assert any(f"trial {result.chosen.number} of 12" in line for line in result.controller_record().provenance)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "known"),
+    [(1.1, 1.6, True), (1.2, 1.2, True), (-0.1, 0.4, False), (0.0, 0.4, False), (0.5, 1.5, False)],
+)
+def test_an_estimate_that_says_nothing_is_not_told(told, low, high, known):
+    result, *_ = told  # of the costs 1, 2, 3, whose standard deviation is 0.8
+    estimate = Estimate(0, result.trials[0].theta, 1.2, low, high)
+    expected = ("1.2", f"90 %: {low:.4g} to {high:.4g}")
+    nothing = ("", "too few trials to say what the best is worth without noise")
+    assert estimate_told(estimate, result.trials) == (expected if known else nothing)
 
 
 @pytest.fixture

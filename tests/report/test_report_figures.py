@@ -1,6 +1,7 @@
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 
 from socasadi import Circle, LinearMPC, Modal, Rod, SimulatedPlant, Study
 from socasadi.report import figures, save_figures
@@ -49,6 +50,30 @@ def test_inputs_show_every_cable_and_the_bounds(result):
     for j in range(3):
         np.testing.assert_allclose(curve(drawn, f"cable {j + 1}")[1], episode.tension[:, j])
     assert drawn.axes[0].get_ylabel() == "tension / N"
+
+
+def test_inputs_are_told_apart_in_grey_and_named_at_their_lines(result):
+    drawn = figures(result)["inputs"].axes[0]
+    cables = [line for line in drawn.lines if str(line.get_label()).startswith("cable")]
+    grey = sorted(float(np.dot(to_rgb(line.get_color()), (0.299, 0.587, 0.114))) for line in cables)
+    assert np.diff(grey).min() > 0.15
+    episode = result.episode(result.best.number)
+    for j, text in enumerate(drawn.texts):
+        k = int(np.argmin(np.abs(episode.time[:-1] - text.get_position()[0])))
+        assert (text.get_text(), text.get_position()[1]) == (str(j + 1), episode.tension[k, j])
+    assert len(drawn.texts) == len(cables)
+    # The last instant of the task is on the axis, with its tick.
+    assert drawn.get_xlim() == (0, 2)
+    assert 2.0 in drawn.get_xticks()
+
+
+def test_figures_say_which_trial_they_show(result):
+    best = result.best.number
+    drawn = figures(result)
+    for name in ("responses", "path", "inputs", "shapes"):
+        assert [text.get_text() for text in drawn[name].texts] == [f"trial {best}"]
+    assert drawn["convergence"].axes[0].texts[0].get_text() == f"{result.best.J:.3g}, trial {best}"
+    assert [text.get_text() for text in figures(result, trial=3)["inputs"].texts] == ["trial 3"]
 
 
 def test_another_trial_can_be_drawn(result):

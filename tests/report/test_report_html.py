@@ -6,6 +6,7 @@ import re
 import shutil
 import sqlite3
 from functools import partial
+from html import escape
 from html.parser import HTMLParser
 
 import numpy as np
@@ -13,10 +14,11 @@ import pytest
 from report_support import MODEL, small_run
 
 from socasadi import Circle, ExternalPlant, LinearMPC, Study
-from socasadi.campaign import Campaign
+from socasadi.campaign import Campaign, Result
 from socasadi.feasibility import check
-from socasadi.report import html_report
+from socasadi.report import html_report, write_report
 from socasadi.report.html import _data, _pieces
+from socasadi.tune import Estimate
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +107,31 @@ def test_the_page_names_theta_with_units_and_where_it_is_likely(result, page):
         assert np.all(np.array(found["middle"]) <= np.array(found["high"]))
 
 
+def test_the_page_says_why_another_trial_than_the_best_is_exported(result, folder, page, monkeypatch):
+    words = "exported: trial"
+    assert (words in page) == (result.chosen.number != result.best.number)
+    other = next(trial for trial in result.trials if trial.number != result.best.number)
+    monkeypatch.setattr(Result, "chosen", other)
+    page = html_report(folder).read_text(encoding="utf-8")
+    assert f"trial {result.best.number}; {words} {other.number}, the best of those flown again" in page
+
+
+def test_a_heading_stands_as_the_cells_below_it(page):
+    for table in re.findall(r"<table.*?</table>", page, re.S):
+        heads = re.findall(r"<th scope=\"col\"([^>]*)>", table)
+        row = re.findall(r"<t[hd]([^>]*)>", re.split(r"<tbody>", table)[1].split("</tr>")[0])
+        for head, cell in list(zip(heads, row, strict=False))[1:]:  # the first ones are all at the left
+            assert ('class="left"' in head) == ('class="left"' in cell) or "findings" in table
+
+
+def test_an_estimate_that_says_nothing_gives_its_tile_no_number(result, folder, monkeypatch):
+    worthless = Estimate(0, result.trials[0].theta, 3141.0, -1.0, 9e9)
+    monkeypatch.setattr(Result, "best_estimated", worthless)
+    page = html_report(folder).read_text(encoding="utf-8")
+    assert "too few trials to say what the best is worth without noise" in page
+    assert "3141" not in page.split("<section")[0]
+
+
 def test_the_page_says_what_the_check_and_the_export_said(page):
     assert "all of the reference can be held" in page
     assert "this machine" in page
@@ -131,7 +158,10 @@ def test_what_a_robot_says_cannot_write_into_the_page(external, tmp_path):
 )
 def test_what_is_gone_is_named_and_the_rest_is_shown(folder, lost, said):
     shutil.rmtree(folder / lost) if (folder / lost).is_dir() else (folder / lost).unlink()
-    page = html_report(folder).read_text(encoding="utf-8")
+    written = write_report(folder)
+    page = written.file.read_text(encoding="utf-8")
+    assert written.damaged == (lost == "journal.sqlite")
+    assert all(escape(line) in missing(page) for line in written.lacks)
     assert said in missing(page)
     assert "all of the reference can be held" in page
 
@@ -144,11 +174,27 @@ def test_without_settings_the_trials_are_still_shown(folder):
     assert data(page)["episodes"]
 
 
+@pytest.mark.parametrize("settings", ['{"settings": ', '{"settings": {}}', None])
+def test_a_run_without_its_settings_is_damaged(folder, settings):
+    (folder / "study.json").unlink() if settings is None else (folder / "study.json").write_text(settings)
+    assert write_report(folder).damaged
+
+
+def test_a_study_that_only_its_script_makes_is_no_damage(folder):
+    told = (folder / "study.json").read_text()
+    (folder / "study.json").write_text(told.replace('"socasadi.campaign.experiment.Circle"', '"script.Mine"'))
+    written = write_report(folder)
+    assert any("can only be made by the study script" in line for line in written.lacks)
+    assert not written.damaged
+
+
 def test_a_damaged_record_costs_its_own_trial_alone(result, folder):
     number = next(trial.number for trial in result.trials if trial.number != result.best.number)
     with sqlite3.connect(folder / "journal.sqlite") as journal:
         journal.execute("UPDATE trial SET episode = x'00112233' WHERE number = ?", (number,))
-    page = html_report(folder).read_text(encoding="utf-8")
+    written = write_report(folder)
+    assert written.damaged
+    page = written.file.read_text(encoding="utf-8")
     assert f"the record of trial {number}" in missing(page)
     assert set(data(page)["episodes"]) == {str(t.number) for t in result.trials if t.number != number}
 

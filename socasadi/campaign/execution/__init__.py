@@ -3,7 +3,7 @@
 from ._campaign import Campaign
 from ._dask import DaskExecutor, dask_executor
 from ._flight import fly_once
-from ._loop import run_campaign
+from ._loop import check_run, run_campaign
 from ._outcome import best_trial, flown_cost, keeps_limits, replayed
 from ._processes import Processes
 from ._progress import Clock, Progress, clock, print_progress, progress_line
@@ -16,6 +16,7 @@ __all__ = [
     "Processes",
     "Progress",
     "best_trial",
+    "check_run",
     "clock",
     "dask_executor",
     "flown_cost",

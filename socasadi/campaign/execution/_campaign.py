@@ -1,3 +1,4 @@
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
@@ -23,6 +24,33 @@ if TYPE_CHECKING:
     from .._study import Study
 
 _MAY_DIFFER = ("iterations", "verifications")
+
+
+def check_folder(study: "Study", folder: Path, resume: bool) -> bool:
+    """Whether ``folder`` holds a run, with which ``study`` may go on; nothing is written.
+
+    Raises
+    ------
+    RunError, JournalError
+        As :class:`Campaign`, but for a journal that another process is writing.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise RunError(f"{folder} is a file; name a folder for the run")
+    if folder.exists() and any(folder.iterdir()) and not resume:
+        raise RunError(f"{folder} exists already; resume it (--resume), or name another folder")
+    started = begun(folder)
+    if started and not settings_path(folder).exists():
+        raise RunError(f"{folder} is no run folder: it has no study.json")
+    if started:
+        compare_settings(folder, study.settings, _MAY_DIFFER)
+        with Journal(journal_path(folder)) as journal:
+            _check_trials(study, folder, len(journal.trials()) + len(journal.pending()))
+    return started
+
+
+def _check_trials(study: "Study", folder: Path, trials: int) -> None:
+    if trials > study.trials:
+        raise RunError(f"{folder} holds {trials} trials already; ask for no fewer, not for {study.trials}")
 
 
 class Campaign:
@@ -53,14 +81,8 @@ class Campaign:
 
     def __init__(self, study: "Study", folder: str | Path, resume: bool = False) -> None:
         folder = Path(folder)
-        if folder.exists() and not folder.is_dir():
-            raise RunError(f"{folder} is a file; name a folder for the run")
-        if folder.exists() and any(folder.iterdir()) and not resume:
-            raise RunError(f"{folder} exists already; resume it (--resume), or name another folder")
+        started = check_folder(study, folder, resume)
         study.optimizer()  # refuses what cannot be searched, before anything is written
-        started = begun(folder)
-        if started and not settings_path(folder).exists():
-            raise RunError(f"{folder} is no run folder: it has no study.json")
         folder.mkdir(parents=True, exist_ok=True)
         # The journal is made before the settings are written: a folder with settings and no journal has lost it.
         self._open(study, folder, create=not started)
@@ -69,11 +91,7 @@ class Campaign:
                 compare_settings(folder, study.settings, _MAY_DIFFER)
             elif self.trials or self.pending:
                 raise RunError(f"{folder} holds trials, but no study.json that says of what: restore it from a copy")
-            if len(self.trials) + len(self.pending) > study.trials:
-                raise RunError(
-                    f"{folder} holds {len(self.trials) + len(self.pending)} trials already; ask for no fewer, not for "
-                    f"{study.trials}"
-                )
+            _check_trials(study, folder, len(self.trials) + len(self.pending))
             write_settings(folder, study.settings)
         except BaseException:
             self.close()
@@ -261,9 +279,9 @@ class Campaign:
         if (asked := self._pending.get(number)) is None:
             told = any(trial.number == number for trial in self._trials)
             out = ", ".join(map(str, self._pending)) or "none"
-            raise RunError(
-                f"trial {number} of {self.folder} was {'told already' if told else 'never asked'}; not told yet: {out}"
-            )
+            was = "told already" if told else "never asked"
+            first = "" if told else f"; ask first: socasadi ask {shlex.quote(str(self.folder))}"
+            raise RunError(f"trial {number} of {self.folder} was {was}; not told yet: {out}{first}")
         return asked
 
     def _check_measured(self, number: int, measured: Mapping[str, float] | None) -> None:

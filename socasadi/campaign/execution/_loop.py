@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ...plant import ExternalPlant
 from ..experiment import check_interrupt, interruptible
 from ..store import Asked, RunError, Trial
-from ._campaign import Campaign
+from ._campaign import Campaign, check_folder
 from ._flight import Flown, fly_trial
 from ._order import check_answer, check_not_ordered, fly_order, read_answer, script_of, write_order
 from ._outcome import broken_limits
@@ -24,6 +24,19 @@ if TYPE_CHECKING:
 GRACE = 60.0
 _LOSSES = 3
 _LONGEST = 3600.0  # s to wait without a look at the clock
+
+
+def check_run(study: "Study", folder: Path, *, resume: bool) -> None:
+    """Refuse a robot that cannot be flown from here and a folder that holds something else; nothing is written.
+
+    Raises
+    ------
+    ExternalPlantError, RunError, JournalError
+        As :meth:`Study.run`.
+    """
+    if isinstance(study.plant, ExternalPlant):
+        study.plant.prepare()
+    check_folder(study, folder, resume)
 
 
 def run_campaign(

@@ -18,10 +18,12 @@ def load_study(script: Path) -> "Study":
     Raises
     ------
     RunError
-        There is no such file, it breaks off (the message says where), or it defines no study.
+        There is no such file, it is none of Python's, it breaks off (the message says where), or it defines no study.
     """
     from .._study import Study
 
+    if script.is_file() and script.suffix != ".py":
+        raise RunError(f"{script} is no Python file (.py); name the one that defines the study")
     study = load_script(script).get("study")
     if not isinstance(study, Study):
         raise RunError(f"{script} defines no `study`: let it make one, study = Study(plant=..., mpc=..., task=...)")
@@ -36,6 +38,8 @@ def load_script(script: Path) -> dict[str, Any]:
     RunError
         There is no such file, or it breaks off; the message says where.
     """
+    if script.is_dir():
+        raise RunError(f"{script} is a folder; name the Python file that defines the study")
     if not script.is_file():
         raise RunError(f"there is no study script {script}")
     # As when Python runs it: the script may import what lies beside it.

@@ -19,7 +19,7 @@ _REFERENCE = 0.01
 _BEYOND = 1e-3
 """Share of the largest input by which one may be beyond its bounds: rounding."""
 _IMPLAUSIBLE = 30.0
-"""How many times the largest of references and output bounds are taken for another unit."""
+"""How many times the largest of references and bounds are taken for another unit."""
 
 
 def check_recorded(
@@ -117,7 +117,9 @@ def _check_sizes(
     beyond = np.maximum(episode.tension - upper, lower - episode.tension) > _BEYOND * mpc.input_scale
     if beyond.any():
         k, j = np.unravel_index(np.argmax(beyond), beyond.shape)
+        times = float((np.abs(episode.tension) / mpc.input_scale).max())
+        hint = ": is it in mN?" if units.input == "N" and _IMPLAUSIBLE < times <= 1e3 else ""
         raise ValueError(
             f"{place(int(k), f'u{j + 1}', episode.tension[k, j], units.input)}, beyond its bounds {lower[j]:g} and "
-            f"{upper[j]:g} {units.input}"
+            f"{upper[j]:g} {units.input}{hint}"
         )

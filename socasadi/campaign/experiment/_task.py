@@ -40,6 +40,15 @@ class Pulse:
         """During how many of a task's ``count`` samples it pushes."""
         return sum(any(self.at(k * sample_time)) for k in range(count)) if any(self.force) else count
 
+    @property
+    def in_words(self) -> str:
+        """What somebody has to do who applies it by hand."""
+        force = ", ".join(f"{value:g}" for value in self.force)
+        return (
+            f"at t = {self.time:g} s push the tip for {self.duration:g} s with ({force}) N along x, y, z of the base, "
+            "x along the arm at rest; the direction stays as the arm moves"
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class Task(ABC):

@@ -4,6 +4,6 @@
 and ``page.html``, ``page.css`` and ``page.js`` show that with Plotly, which is written into the file.
 """
 
-from ._page import html_report
+from ._page import Report, html_report, write_report
 
-__all__ = ["html_report"]
+__all__ = ["Report", "html_report", "write_report"]

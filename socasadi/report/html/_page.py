@@ -3,6 +3,7 @@ import hashlib
 import io
 import json
 import os
+from dataclasses import dataclass
 from datetime import datetime
 from importlib.resources import files
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 
 import jinja2
 
-from ...campaign import Study, Units, bound_notes, trial_row, verdict_row
+from ...campaign import Study, Units, bound_notes, estimate_told, trial_row, verdict_row
 from ...campaign.store import journal_path
 from ...feasibility import Check
 from ...plant import ExternalPlant
@@ -20,6 +21,25 @@ from ._pieces import Pieces
 
 _LARGEST = 7_800_000
 """Bytes of a page."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """A page that was written.
+
+    Attributes
+    ----------
+    file
+        Where.
+    lacks
+        What it says that it lacks, a line each.
+    damaged
+        Whether the run's settings or its journal are missing or damaged, and not only pieces that a run may lack.
+    """
+
+    file: Path
+    lacks: tuple[str, ...]
+    damaged: bool
 
 
 def html_report(
@@ -52,6 +72,13 @@ def html_report(
     ValueError
         It holds neither settings nor trials: it is no run.
     """
+    return write_report(folder, file, study, found).file
+
+
+def write_report(
+    folder: str | Path, file: str | Path | None = None, study: Study | None = None, found: Check | None = None
+) -> Report:
+    """Do as :func:`html_report`, and say what the page lacks."""
     from plotly.offline import get_plotlyjs  # takes its time
 
     folder = Path(folder)
@@ -79,7 +106,7 @@ def html_report(
         os.replace(part, file)
     finally:
         part.unlink(missing_ok=True)
-    return file
+    return Report(file, tuple(pieces.missing), pieces.damaged)
 
 
 def _environment() -> jinja2.Environment:
@@ -93,10 +120,13 @@ def _told(pieces: Pieces) -> dict[str, Any]:
     score = best.score if best else None
     tiles = []
     if best is not None:
-        tiles.append(("best J observed", f"{best.J:.4g}", f"trial {best.number}"))
-    if pieces.estimate is not None and pieces.estimate.low > 0:  # no sum of squares is below
-        about = f"90 %: {pieces.estimate.low:.4g} to {pieces.estimate.high:.4g}"
-        tiles.append(("best J without noise, estimated", f"{pieces.estimate.cost:.4g}", about))
+        about = f"trial {best.number}"
+        if pieces.chosen is not None and pieces.chosen.number != best.number:
+            about += f"; exported: trial {pieces.chosen.number}, the best of those flown again"
+        tiles.append(("best J observed", f"{best.J:.4g}", about))
+    if pieces.estimate is not None:
+        cost, sure = estimate_told(pieces.estimate, trials)
+        tiles.append(("best J without noise, estimated", cost or "not known", sure))
     if score is not None:
         # Of a recording nothing but the measurements is known.
         outputs = "measured" if study and isinstance(study.plant, ExternalPlant) else "true"

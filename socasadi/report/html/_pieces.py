@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ...campaign import Episode, Journal, Result, Study, Trial, Verdict, assessed
+from ...campaign import Episode, ForeignTypeError, Journal, Result, Study, Trial, Verdict, assessed
 from ...campaign.store import journal_path, read_settings
 from ...feasibility import Check, check
 from ...plant import ExternalPlant, SimulatedPlant
@@ -15,7 +15,10 @@ T = TypeVar("T")
 
 @dataclass(eq=False)
 class Pieces:
-    """What a run folder holds for its report; what is not there is None or empty, and named in ``missing``."""
+    """What a run folder holds for its report; what is not there is None or empty, and named in ``missing``.
+
+    ``damaged`` is whether the settings or the journal are among that, without which no run is.
+    """
 
     folder: Path
     settings: dict[str, Any] = field(default_factory=dict)
@@ -31,6 +34,7 @@ class Pieces:
     costs: list[list[str]] = field(default_factory=list)
     pending: int = 0
     missing: list[str] = field(default_factory=list)
+    damaged: bool = False
     _result: Result | None = None
 
     @classmethod
@@ -43,7 +47,7 @@ class Pieces:
     def episode(self, number: int) -> Episode | None:
         """The record of a trial; None where there is none, or it is damaged, which is noted."""
         with Journal(journal_path(self.folder)) as journal:
-            return self._try(f"the record of trial {number}", lambda: journal.episode(number), None)
+            return self._try(f"the record of trial {number}", lambda: journal.episode(number), None, core=True)
 
     def kept(self, trial: Trial) -> bool:
         """Whether a trial is done and kept all limits."""
@@ -51,9 +55,9 @@ class Pieces:
 
     def _read(self, study: Study | None) -> None:
         folder = self.folder
-        self.settings = self._try("study.json", lambda: _whole_settings(folder), {})
-        self.study = study or self._try("the study", lambda: Result.open(folder).study, None)
-        self.trials = self._try("the journal", lambda: _trials(folder), [])
+        self.settings = self._try("study.json", lambda: _whole_settings(folder), {}, core=True)
+        self.study = study or self._try("the study", lambda: Result.open(folder).study, None, core=True)
+        self.trials = self._try("the journal", lambda: _trials(folder), [], core=True)
         if self.study is None:
             self.best = min((t for t in self.trials if t.J is not None), key=lambda t: t.J or 0.0, default=None)
             return
@@ -83,10 +87,13 @@ class Pieces:
         plant = self.study and self.study.plant
         return plant if isinstance(plant, SimulatedPlant) and not plant.rod.parameters else None
 
-    def _try(self, what: str, make: Callable[[], T], otherwise: T) -> T:
+    def _try(self, what: str, make: Callable[[], T], otherwise: T, core: bool = False) -> T:
+        """What ``make`` makes, or ``otherwise``; ``core`` pieces are the settings and the journal."""
         try:
             return make()
         except Exception as error:  # whatever is wrong with a piece, the others are still worth a page
+            foreign = isinstance(error.__cause__, ForeignTypeError)  # which its study script can make
+            self.damaged = self.damaged or (core and not foreign)
             kind = "" if isinstance(error, (RuntimeError, ValueError, OSError)) else f"{type(error).__name__}: "
             self.missing.append(f"{what}: {kind}{error}")
             return otherwise

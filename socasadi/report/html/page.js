@@ -3,8 +3,8 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const byId = (id) => document.getElementById(id);
   const BLUE = "#0072b2", ORANGE = "#d55e00", GREEN = "#009e73", GREY = "#7f7f7f", BLACK = "#1b1f24";
-  const COLOURS = [BLUE, ORANGE, GREEN, "#aa4499", "#3a86b8", "#a66f00"];
-  const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"];
+  const COLOURS = [BLUE, "#e69f00", BLACK, "#56b4e9", ORANGE, "#004b7a"];  // as the figures of a run
+  const DASHES = ["solid", "solid", "solid", "longdash", "longdash", "longdash"];
   const SIDES = 14;           // of a section that is drawn
   const CURSOR_EVERY = 80;    // ms between two moves of the marks in the flat plots
   const config = { displaylogo: false, responsive: true, showSendToCloud: false, plotlyServerURL: "", showEditInChartStudio: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
@@ -230,9 +230,9 @@
     const at = times(flight, flight.truth.length);
     for (let i = 0; i < count; i++) {
       const row = { xaxis: "x", yaxis: `y${i ? i + 1 : ""}`, showlegend: i === 0 };
-      traces.push(Object.assign({ x: at, y: column(flight.output, i), mode: "lines", line: { color: "#6b7280", width: 1 }, name: "measured" }, row));
+      traces.push(Object.assign({ x: at, y: column(flight.output, i), mode: "lines", line: { color: "#b3bac4", width: 6 }, name: "measured" }, row));
       if (reference) traces.push(Object.assign({ x: at, y: column(reference, i).slice(0, at.length), mode: "lines", line: { color: BLACK, dash: "dash", width: 1.5 }, name: "reference" }, row));
-      traces.push(Object.assign({ x: at, y: column(flight.truth, i), mode: "lines", line: { color: BLUE, width: 2 }, name: "true" }, row));
+      traces.push(Object.assign({ x: at, y: column(flight.truth, i), mode: "lines", line: { color: BLUE, width: 1.5 }, name: "true" }, row));
       more[`yaxis${i ? i + 1 : ""}`] = axis(`${outputName(i, count)} / ${unit}`, { domain: [1 - (i + 1) / count + 0.03, 1 - i / count - 0.02] });
       if (data.limits.output) for (const limits of data.limits.output) if (limits[i] !== null)
         shapes.push({ type: "line", xref: "paper", x0: 0, x1: 1, yref: row.yaxis, y0: factor * limits[i], y1: factor * limits[i], line: { color: ORANGE, dash: "dot", width: 1.5 } });
