@@ -219,7 +219,9 @@ def test_a_mistake_is_answered_by_one_sentence(tmp_path, arguments, words):
     assert len(run.stderr.strip().splitlines()) == 1
 
 
-@pytest.mark.parametrize("options", [("--real", "float"), ("--solver", "osqp"), ("--name", "arm")])
+@pytest.mark.parametrize(
+    "options", [("--real", "float"), pytest.param(("--solver", "osqp"), marks=pytest.mark.slow), ("--name", "arm")]
+)
 def test_a_run_is_exported_in_every_way(finished, tmp_path, options):
     if "osqp" in options:
         pytest.importorskip("osqp", reason="the package osqp is not installed")
@@ -285,9 +287,12 @@ def test_what_the_readme_and_the_guide_show_of_python_runs(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
     others = re.findall(r"```python\n(.*?)```", (ROOT / "studies" / "guide.md").read_text(), re.S)
     assert len(others) == 6
-    for block in others:
-        run = subprocess.run([sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True)
-        assert run.returncode == 0, run.stderr
+    # One process, since each would spend most of its time on imports; each block has its own names.
+    each = "\n".join(
+        f"exec(compile({block!r}, 'block {i}', 'exec'), {{'__name__': '__main__'}})" for i, block in enumerate(others)
+    )
+    run = subprocess.run([sys.executable, "-c", each], cwd=tmp_path, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
     assert "casadi_real" in (tmp_path / "rhs.c").read_text()
     short = code.replace("iterations=20", "iterations=1, seed_points=2")
     assert short != code

@@ -34,7 +34,9 @@ def test_every_method_brings_a_controller_in_the_smoke_comparison(smoke):
         rows = list(csv.DictReader(file))
     assert len({row["method"] for row in rows}) >= 15
     assert {row["task"] for row in rows} == {"circle", "origin"}
-    assert all(float(row["J"]) < 60 for row in rows)
+    # A trial of the search for robustness takes five flights, for which there is no time in this size.
+    assert {row["method"] for row in rows if row["J"] == "-"} <= {"for the worst"}
+    assert all(float(row["J"]) < 60 for row in rows if row["J"] != "-")
     assert all(row["failed"].startswith("0 of") for row in rows)
     assert "[1/" in done.stdout
     assert "left" in done.stdout

@@ -65,9 +65,9 @@ def test_the_first_flies_nothing_again(tmp_path):
 def test_the_second_brings_a_campaign_to_its_end_and_refuses_to_begin_over_it(tmp_path):
     done = read("2_own_robot", tmp_path, "lab")
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "known from the rod:" in said(done.stdout, "socasadi check arm.py --spec arm.toml")
+    assert "known from the data sheet:" in said(done.stdout, "socasadi check arm.py --spec arm.toml")
     told = said(done.stdout, "socasadi check arm.py --spec arm.toml --record probe.csv")
-    assert "known from the rod and the probing record:" in told
+    assert "known from the data sheet and the probing record:" in told
     pending = said(done.stdout, "socasadi ask runs/arm --pending").splitlines()
     assert [line.split()[0] for line in pending] == ["trial", "2", "3"]
     told = said(done.stdout, "socasadi tell runs/arm --trial 2 --csv millimetres.csv")

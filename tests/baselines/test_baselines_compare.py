@@ -190,7 +190,7 @@ def test_a_size_is_less_of_the_same():
     assert (quick.seeds, quick.checkpoints, quick.flights) == ((0, 1, 2), (1, 10, 30), 3)
     smoke = whole.of_size("smoke")
     assert (smoke.seeds, smoke.checkpoints) == ((0,), (1, 10))
-    assert smoke.of("circle", 0).task.duration == 3.0
+    assert smoke.of("circle", 0).task.duration == 5.0
     with pytest.raises(ValueError, match="smoke, quick, full"):
         whole.of_size("huge")
 

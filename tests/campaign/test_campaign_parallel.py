@@ -301,7 +301,7 @@ class TestStops:
     @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
     def test_no_worker_is_left_behind_and_nothing_told_is_lost(self, script, tmp_path, number):
         settings = "search='sobol', seed_points=24, iterations=0"
-        file = script("time.sleep(0.005)", settings)
+        file = script("time.sleep(0.01)", settings)
         process = self.start(file, tmp_path)
         assert len(processes_of(tmp_path)) >= 3
         process.send_signal(number)

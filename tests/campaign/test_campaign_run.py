@@ -43,7 +43,8 @@ class TestContinuation:
 
 
 def test_factors_on_settings_are_searched_shown_and_exported_with_the_model(toy_study, tmp_path):
-    study = replace(toy_study, mpc=replace(toy_study.mpc, tuned={"R": (0.1, 10.0), "input_noise": (0.01, 1.0)}))
+    mpc = replace(toy_study.mpc, tuned={"R": (0.1, 10.0), "input_noise": (0.01, 1.0)})
+    study = replace(toy_study, mpc=mpc, task=Circle(duration=1.0, period=2.0))
     result = study.run(tmp_path / "run", progress=None)
     factors = points(result)[:, -2:]
     assert np.ptp(np.log(factors), axis=0).min() > 1.0

@@ -235,12 +235,13 @@ def test_nothing_is_allocated_printed_or_kept_outside_the_instance(folder):
 @pytest.mark.parametrize(
     ("mpc", "calls", "defined"),
     [
-        (LinearMPC(Modal()), 200_000, []),
-        (BUSY, 100_000, ["-DRATED"]),
-        (TOLD, 100_000, ["-DDISTURBED"]),
+        (LinearMPC(Modal()), 100_000, []),
+        (BUSY, 50_000, ["-DRATED"]),
+        (TOLD, 50_000, ["-DDISTURBED"]),
         pytest.param(LinearMPC(Modal()), 1_000_000, [], marks=pytest.mark.slow),
+        pytest.param(BUSY, 500_000, ["-DRATED"], marks=pytest.mark.slow),
     ],
-    ids=["default", "rates", "told", "a million"],
+    ids=["default", "rates", "told", "a million", "half a million rated"],
 )
 def test_whatever_comes_in_the_inputs_keep_their_bounds_and_nothing_is_spoilt(tmp_path, mpc, calls, defined, real):
     export(record(mpc, samples=5), tmp_path, real=real, figures=False)

@@ -99,7 +99,7 @@ def test_a_record_in_another_unit_is_told_as_that_and_as_nothing_else(part, fact
         (lambda u, y: (u[:, [1, 2, 0]], y), "u3, u1, u2"),
         (lambda u, y: (-u, y), "sign of every input"),
         (lambda u, y: (u, y + np.array([0.03, 0.0])), "counted from where it rests"),
-        (lambda u, y: (u[4:], y[:-4]), "4 samples late"),
+        pytest.param(lambda u, y: (u[4:], y[:-4]), "4 samples late", marks=pytest.mark.slow),
     ],
 )
 def test_what_people_get_wrong_in_a_record_is_named(mistaken, told):

@@ -41,7 +41,8 @@ def test_half_of_a_box_may_fail(d, seed):
     check_plateau(d, seed, 30 + 2 * d)
 
 
-@pytest.mark.parametrize(("share", "seed"), [(0.5, 0), pytest.param(0.25, 1, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("share", "seed"), [(0.5, 0), (0.25, 1)])
 def test_a_box_within_the_box_is_found_whose_every_border_fails(share, seed):
     # No half-space: a search that looks for costs where there are none yet goes from one face of the box to the next.
     half = share ** (1 / 6) / 2

@@ -58,6 +58,7 @@ def test_two_limits_are_kept_at_once():
     assert search.best.theta[0] <= 0.3
 
 
+@pytest.mark.slow
 def test_gardners_first_problem_is_solved():
     cost, measure, limit = GARDNER_1
     search = limited(Optimizer(GARDNER, seed=0, seed_points=8, limits={"load": limit}), cost, measure, 22)

@@ -152,6 +152,7 @@ def needed(seed, q, regret=0.2, most=48):
     return len(search.trials)
 
 
+@pytest.mark.slow
 def test_four_at_a_time_need_no_more_than_twice_the_evaluations():
     assert needed(0, 4) <= 2 * needed(0, 1)
 
