@@ -20,12 +20,11 @@ from socasadi.baselines import (
     NonlinearMPC,
     Subspace,
     WeightSearch,
-    _deepc,
-    _koopman,
     worth,
 )
-from socasadi.baselines._nonlinear import _advance
-from socasadi.baselines._robust import _most_robust
+from socasadi.baselines.methods import _deepc, _koopman
+from socasadi.baselines.methods._robust import _most_robust
+from socasadi.baselines.methods._sampled import sampled
 from socasadi.campaign import probe
 from socasadi.codegen import c_compiler
 from socasadi.model import StateSpace, subspace
@@ -165,7 +164,7 @@ def test_the_difference_quotients_are_the_derivatives_of_the_rods_step():
     rng = np.random.default_rng(0)
     x, u = np.concatenate([0.3 * rng.standard_normal(n // 2), rng.standard_normal(n // 2)]), rng.uniform(-5, 5, 3)
     x[n // 4 :] *= 0.05
-    after, slopes, y, C = (value.full() for value in _advance(plant, 3)(x, u))
+    after, slopes, y, C = (value.full() for value in sampled(plant, 3)(x, u))
     step = plant.rod.step_expression(plant.sample_time, plant.sample_time / 4)
     exact = step.jacobian()(x, u, np.zeros(3), after)
     exact = np.hstack([exact[0].full(), exact[1].full()])

@@ -88,7 +88,7 @@ def _median(value: Any) -> float:
     return float(np.median(values))
 
 
-def table(summary: Summary, checkpoint: int = -1) -> list[dict[str, str]]:
+def summary_table(summary: Summary, checkpoint: int = -1) -> list[dict[str, str]]:
     """One row a task and method: texts by heading, medians over flights and seeds."""
     rows = []
     for task in summary.tasks:

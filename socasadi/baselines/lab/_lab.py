@@ -3,9 +3,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..campaign import Episode, Pilot, Study, fly_once, probe
-from ..model import Record
-from ..plant import Plant
+from ...campaign import Episode, Pilot, Study, fly_once, probe
+from ...model import Record
+from ...plant import Plant
 
 _TRIAL, _PROBE = 0, 2
 """Streams of random numbers: those of a campaign's trials and probing records."""

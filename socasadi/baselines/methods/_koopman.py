@@ -4,12 +4,10 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from ..campaign import Pilot
-from ..model import Entry, Record
-from ..mpc import LinearMPC
-from ._lab import Lab
-from ._law import Forecast, Law, Program, looked_ahead
-from ._method import Method, tuned
+from ...campaign import Pilot
+from ...model import Entry, Record
+from ...mpc import LinearMPC
+from ..lab import Forecast, Lab, Law, Method, Program, looked_ahead, tuned
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..plant import Plant, SimulatedPlant
-from ..rod import Cable, Payload, Rod
+from ...plant import Plant, SimulatedPlant
+from ...rod import Cable, Payload, Rod
 
 
 @dataclass(frozen=True)

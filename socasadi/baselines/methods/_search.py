@@ -2,9 +2,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from ..campaign import Pilot
-from ._lab import Lab
-from ._method import Method, tuned
+from ...campaign import Pilot
+from ..lab import Lab, Method, tuned
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,10 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ..campaign import Pilot
-from ..model import StateSpace, subspace
-from ..plant import SimulatedPlant
-from ._lab import Lab
-from ._method import Information, Method, identified
+from ...campaign import Pilot
+from ...model import StateSpace, subspace
+from ...plant import SimulatedPlant
+from ..lab import Information, Lab, Method, identified
 
 
 @dataclass(frozen=True)

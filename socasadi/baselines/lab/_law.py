@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..mpc import KKT_TOLERANCE, ActiveSet, ControllerInfo, LinearMPC, weight_matrix
-from ..mpc.formulation import dual_program
+from ...mpc import KKT_TOLERANCE, ActiveSet, ControllerInfo, LinearMPC, weight_matrix
+from ...mpc.formulation import dual_program
 
 
 class Law(ABC):

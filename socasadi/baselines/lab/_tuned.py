@@ -1,4 +1,5 @@
-from abc import ABC, abstractmethod
+"""What a campaign does with theta, for any numbers of a method."""
+
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -6,38 +7,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..campaign import Pilot, Study
-from ..model import Entry, StateSpace, identify
-from ..mpc import DesignError
-from ..plant import Plant
-from ..tune import Optimizer, RandomSearch, Search, SobolSearch, Space
+from ...campaign import Pilot, Study
+from ...model import Entry
+from ...mpc import DesignError
+from ...plant import Plant
+from ...tune import Optimizer, RandomSearch, Search, SobolSearch, Space
 from ._lab import Lab
-
-Information = Literal["data sheet", "plant model"]
 
 _WITHOUT_FLIGHT = 1000
 """Thetas in a row that give no controller, after which a search is over."""
-
-
-@dataclass(frozen=True)
-class Method(ABC):
-    """A way to get a controller for a robot of which nothing is known but its data sheet and what it shows.
-
-    One of one's own is a frozen dataclass that inherits this one and defines :meth:`offers`.
-    """
-
-    @property
-    def information(self) -> Information:
-        """What it is told beforehand: ``"plant model"`` if it reads the true robot's parameters."""
-        return "data sheet"
-
-    @abstractmethod
-    def offers(self, lab: Lab) -> Iterator[Pilot]:
-        """Spend the lab's time, and yield a controller whenever there is a better one than that before.
-
-        What counts at a checkpoint is the last controller before it. The lab ends it all by :class:`BudgetSpent`, which
-        is not to be caught.
-        """
 
 
 def search_for(kind: str, space: Space, study: Study, initial: Sequence[ArrayLike] = ()) -> Search:
@@ -132,15 +110,3 @@ def _tell(search: Search, theta: np.ndarray, outcome: _Outcome) -> None:
         search.tell(theta, at_least=outcome.at_least)
     else:
         search.tell(theta, outcome.J, failed=outcome.J is None)
-
-
-def identified(lab: Lab, probing: float) -> StateSpace:
-    """The model of the study's family that fits a probing record of so many s best."""
-    mpc = lab.study.mpc
-    return mpc.model.state_space(identify(mpc.model, lab.probe(probing), seed=lab.study.seed), mpc.sample_time)
-
-
-def static_gain(model: StateSpace) -> np.ndarray:
-    """How outputs at rest depend on inputs that are held (p, m)."""
-    A, B, C, D = model
-    return C @ np.linalg.solve(np.eye(len(A)) - A, B) + D

@@ -3,12 +3,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..campaign import Pilot
-from ..model import Entry
-from ..mpc import LinearMPC
-from ._lab import Lab
-from ._law import Law
-from ._method import Method, identified, static_gain, tuned
+from ...campaign import Pilot
+from ...model import Entry
+from ...mpc import LinearMPC
+from ..lab import Lab, Law, Method, identified, static_gain, tuned
 
 
 @dataclass(frozen=True)

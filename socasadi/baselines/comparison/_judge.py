@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..campaign import Pilot, Study, fly_once, probe
-from ..model import StateSpace, state_space_error
-from ..mpc import Controller, ControllerInfo, LinearMPC
-from ..plant import Plant
+from ...campaign import Pilot, Study, fly_once, probe
+from ...model import StateSpace, state_space_error
+from ...mpc import Controller, ControllerInfo, LinearMPC
+from ...plant import Plant
 
 _VERIFICATION = 1
 """Stream of random numbers: that of a campaign's verification."""

@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cho_factor, cho_solve
 
-from ..campaign import Pilot
-from ..model import StateSpace
-from ..mpc import Controller, ControllerInfo, weight_matrix
-from ._lab import Lab
-from ._method import Method, identified
+from ...campaign import Pilot
+from ...model import StateSpace
+from ...mpc import Controller, ControllerInfo, weight_matrix
+from ..lab import Lab, Method, identified
 
 _BEFORE, _AFTER = 40, 200
 """Samples before and after a change of the reference in which the loop answers to it."""

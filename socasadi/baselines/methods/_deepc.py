@@ -5,12 +5,10 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import null_space
 
-from ..campaign import Pilot
-from ..model import Entry, Record
-from ..mpc import LinearMPC
-from ._lab import Lab
-from ._law import Forecast, Law, Program, looked_ahead
-from ._method import Method, tuned
+from ...campaign import Pilot
+from ...model import Entry, Record
+from ...mpc import LinearMPC
+from ..lab import Forecast, Lab, Law, Method, Program, looked_ahead, tuned
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,10 @@ import numpy as np
 from scipy.linalg import solve_continuous_are
 from scipy.signal import cont2discrete
 
-from ..campaign import Pilot
-from ..model import Entry, StateSpace
-from ..mpc import DesignError, LinearMPC
-from ._lab import Lab
-from ._law import Law
-from ._method import Method, identified, static_gain, tuned
+from ...campaign import Pilot
+from ...model import Entry, StateSpace
+from ...mpc import DesignError, LinearMPC
+from ..lab import Lab, Law, Method, identified, static_gain, tuned
 
 _ABOVE_LEAST = 1.1
 """gamma of the controller, as a factor on the least that there is."""

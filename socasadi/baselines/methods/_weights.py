@@ -2,11 +2,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from ..campaign import Pilot
-from ..model import Fixed, subspace
-from ..plant import Plant
-from ._lab import Lab
-from ._method import Method, identified, tuned
+from ...campaign import Pilot
+from ...model import Fixed, subspace
+from ...plant import Plant
+from ..lab import Lab, Method, identified, tuned
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,30 @@
+"""Methods beside each other: the same robots, tasks and seeds, at equal cost, judged alike."""
+
+from ._cell import fly_cell
+from ._comparison import Comparison, Size
+from ._judge import Elsewhere, Worth, worth, worth_elsewhere
+from ._others import DeadCable, Delayed, Loaded, Misrouted, Noisier, Rubbing, Softer
+from ._run import load_comparison, run_comparison, stored_cells
+from ._summary import Summary, summary_table
+
+__all__ = [
+    "Comparison",
+    "DeadCable",
+    "Delayed",
+    "Elsewhere",
+    "Loaded",
+    "Misrouted",
+    "Noisier",
+    "Rubbing",
+    "Size",
+    "Softer",
+    "Summary",
+    "Worth",
+    "fly_cell",
+    "load_comparison",
+    "run_comparison",
+    "stored_cells",
+    "summary_table",
+    "worth",
+    "worth_elsewhere",
+]

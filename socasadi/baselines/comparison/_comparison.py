@@ -1,0 +1,114 @@
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
+
+from ...campaign import Study, Task
+from ...campaign.store import describe
+from ..lab import Method
+from ._judge import Elsewhere
+
+Size = Literal["smoke", "quick", "full"]
+
+_SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Which methods are compared, on what, and how long.
+
+    Parameters
+    ----------
+    study
+        Robot, MPC, cost and limits of time that all have in common. Its own task and seed are not used.
+    tasks
+        By name: a task, or a study of its own where the robot is another.
+    methods
+        By name.
+    seeds
+        Each a repetition of all, with other random numbers.
+    checkpoints
+        After how many episodes' worth of the robot's time a method is asked for its controller; ascending.
+    flights
+        Of each controller that is judged, under noise that no method has seen.
+    elsewhere
+        Other robots by name, on which the last controllers of all methods are flown.
+    elsewhere_on
+        The tasks for which they are.
+
+    Raises
+    ------
+    ValueError
+        Nothing is compared, or the checkpoints do not ascend.
+    """
+
+    study: Study
+    tasks: Mapping[str, Task | Study]
+    methods: Mapping[str, Method]
+    seeds: Sequence[int] = tuple(range(10))
+    checkpoints: Sequence[int] = (1, 2, 3, 5, 10, 20, 30, 60, 110)
+    flights: int = 5
+    elsewhere: Elsewhere = field(default_factory=dict)
+    elsewhere_on: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        if not (self.tasks and self.methods and len(self.seeds) and len(self.checkpoints)):
+            raise ValueError("a comparison takes at least one task, method, seed and checkpoint")
+        if list(self.checkpoints) != sorted(set(self.checkpoints)) or self.checkpoints[0] < 1:
+            raise ValueError(f"checkpoints are numbers of episodes that ascend, not {list(self.checkpoints)}")
+        for name, method in self.methods.items():
+            if not isinstance(method, Method):
+                raise TypeError(f"the method {name!r} is a Method, not {method!r}")
+        if unknown := sorted(set(self.elsewhere_on) - set(self.tasks)):
+            raise ValueError(f"elsewhere_on names {unknown[0]!r}; the tasks are {', '.join(self.tasks)}")
+
+    def of_size(self, size: Size) -> "Comparison":
+        """The comparison as it is (``"full"``), or less of it.
+
+        ``"quick"``: the first three seeds, checkpoints up to 30, three flights. ``"smoke"``, whether it works at all:
+        one seed, the first two tasks for 5 s, checkpoints up to 10, one flight, one other robot.
+        """
+        match size:
+            case "full":
+                return self
+            case "quick":
+                points = tuple(at for at in self.checkpoints if at <= 30) or tuple(self.checkpoints[:1])
+                return replace(self, seeds=tuple(self.seeds)[:3], checkpoints=points, flights=min(self.flights, 3))
+            case "smoke":
+                tasks = {name: self._short(name) for name in list(self.tasks)[:2]}
+                points = tuple(at for at in self.checkpoints if at <= 10) or tuple(self.checkpoints[:1])
+                few = {"seeds": tuple(self.seeds)[:1], "checkpoints": points, "flights": 1}
+                others = dict(list(self.elsewhere.items())[:1])
+                on = tuple(name for name in self.elsewhere_on if name in tasks)
+                return replace(self, tasks=tasks, **few, elsewhere=others, elsewhere_on=on)
+        raise ValueError(f"a comparison is of size {', '.join(get_args(Size))}, not {size!r}")
+
+    def of(self, task: str, seed: int) -> Study:
+        """The study of a task and a seed."""
+        given = self.tasks[task]
+        study = given if isinstance(given, Study) else replace(self.study, task=given)
+        return replace(study, seed=int(seed))
+
+    @property
+    def cells(self) -> list[tuple[str, str, int]]:
+        """Task, method and seed of all that is flown, seed by seed."""
+        return [(task, method, int(seed)) for seed in self.seeds for task in self.tasks for method in self.methods]
+
+    def digest(self, task: str, method: str, seed: int) -> str:
+        """What tells a cell from the same one under other settings."""
+        parts = {
+            "schema": _SCHEMA,
+            "study": self.of(task, seed).settings,
+            "method": describe(self.methods[method]),
+            "checkpoints": list(self.checkpoints),
+            "flights": self.flights,
+            "elsewhere": describe(dict(self.elsewhere)) if task in self.elsewhere_on else None,
+        }
+        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
+
+    def _short(self, task: str) -> Task | Study:
+        given = self.tasks[task]
+        if isinstance(given, Study):
+            return replace(given, task=replace(given.task, duration=5.0))
+        return replace(given, duration=5.0)

@@ -1,0 +1,21 @@
+"""What every method is given: a robot for a time, a search for its own numbers, a law that keeps the bounds."""
+
+from ._lab import BudgetSpent, Lab
+from ._law import Forecast, Law, Program, looked_ahead
+from ._method import Information, Method
+from ._models import identified, static_gain
+from ._tuned import tuned
+
+__all__ = [
+    "BudgetSpent",
+    "Forecast",
+    "Information",
+    "Lab",
+    "Law",
+    "Method",
+    "Program",
+    "identified",
+    "looked_ahead",
+    "static_gain",
+    "tuned",
+]

@@ -1,0 +1,30 @@
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from ...campaign import Pilot
+from ._lab import Lab
+
+Information = Literal["data sheet", "plant model"]
+
+
+@dataclass(frozen=True)
+class Method(ABC):
+    """A way to get a controller for a robot of which nothing is known but its data sheet and what it shows.
+
+    One of one's own is a frozen dataclass that inherits this one and defines :meth:`offers`.
+    """
+
+    @property
+    def information(self) -> Information:
+        """What it is told beforehand: ``"plant model"`` if it reads the true robot's parameters."""
+        return "data sheet"
+
+    @abstractmethod
+    def offers(self, lab: Lab) -> Iterator[Pilot]:
+        """Spend the lab's time, and yield a controller whenever there is a better one than that before.
+
+        What counts at a checkpoint is the last controller before it. The lab ends it all by :class:`BudgetSpent`, which
+        is not to be caught.
+        """
