@@ -21,6 +21,12 @@ def compare(
     quick: Annotated[
         bool, typer.Option("--quick", help="Three seeds, 30 episodes' worth of the robot's time.")
     ] = False,
+    tasks: Annotated[
+        list[str] | None, typer.Option("--task", metavar="NAME", help="Only this task; repeatable.")
+    ] = None,
+    methods: Annotated[
+        list[str] | None, typer.Option("--method", metavar="NAME", help="Only this method; repeatable.")
+    ] = None,
     jobs: Annotated[int | None, typer.Option(help="How many cells at once; all processors by default.")] = None,
     dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers fly them.")] = None,
     folder: Annotated[Path | None, typer.Option("--out", help="Its results; runs/NAME-SIZE by default.")] = None,
@@ -34,7 +40,7 @@ def compare(
     if jobs is not None and jobs < 1:
         raise RunError(f"--jobs is at least 1, not {jobs}")
     size = "smoke" if smoke else "quick" if quick else "full"
-    comparison = load_comparison(script, size)
+    comparison = load_comparison(script, size).of_parts(tasks or (), methods or ())
     folder = folder or Path("runs") / f"{script.stem}-{size}"
     out.print(
         f"{script}, {size}: {len(comparison.methods)} methods, {len(comparison.tasks)} tasks, {len(comparison.seeds)} "
@@ -52,7 +58,7 @@ def compare(
         with interruptible(), ExitStack() as stack:
             here = jobs or os.cpu_count() or 1
             executor = stack.enter_context(dask_executor(dask) if dask else Processes(here))
-            cells = run_comparison(script, size, folder, executor, told)
+            cells = run_comparison(script, size, folder, executor, told, tasks=tasks or (), methods=methods or ())
     except KeyboardInterrupt:
         out.print("\nStopped. Every finished cell is stored; the same command goes on.")
         raise typer.Exit(130) from None
@@ -63,15 +69,22 @@ def compare(
         title = f"\n{task}, after {summary.checkpoints[-1]} episodes' worth of the robot's time:"
         out.print(table(shown, left=("method",), title=title))
     out.print(table(_rivals(summary), left=("method", "knows"), title=f"\n{summary.methods[0]} against, in J:"))
+    files = [_written(rows, folder / "table.csv")]
     for task in comparison.elsewhere_on:
-        out.print(table(_elsewhere(summary, task), left=("method",), title=f"\n{task}, J on other robots:"))
-    with (folder / "table.csv").open("w", newline="", encoding="utf-8") as file:
-        write = csv.DictWriter(file, rows[0], lineterminator="\n")
+        others = _elsewhere(summary, task)
+        out.print(table(others, left=("method",), title=f"\n{task}, J on other robots:"))
+        files.append(_written(others, folder / f"elsewhere-{task}.csv"))
+    drawn = save_figures(comparison_figures(summary, comparison, size), folder / "figures")
+    for file in (*files, *drawn):
+        out.print(str(file))
+
+
+def _written(rows: list[dict[str, str]], file: Path) -> Path:
+    with file.open("w", newline="", encoding="utf-8") as text:
+        write = csv.DictWriter(text, rows[0], lineterminator="\n")
         write.writeheader()
         write.writerows(rows)
-    drawn = save_figures(comparison_figures(summary, comparison, size), folder / "figures")
-    for file in (folder / "table.csv", *drawn):
-        out.print(str(file))
+    return file
 
 
 def _line(cell: dict[str, Any]) -> str:

@@ -3,7 +3,7 @@
 import json
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from pathlib import Path
 from typing import Any
@@ -48,6 +48,9 @@ def run_comparison(
     folder: Path,
     executor: Executor,
     progress: Callable[[dict[str, Any], int, int], None] = lambda cell, done, total: None,
+    *,
+    tasks: Sequence[str] = (),
+    methods: Sequence[str] = (),
 ) -> list[dict[str, Any]]:
     """Fly all cells that ``folder`` does not hold yet, each stored when it is done; return them all.
 
@@ -57,13 +60,15 @@ def run_comparison(
         Where they are flown: it is sent names and answers by text.
     progress
         Is told each cell that is done, how many are, and of how many.
+    tasks, methods
+        Names of those that are flown; none is all.
 
     Raises
     ------
     RunError
         No worker can fly a cell, or they die of one; what was done is stored.
     """
-    comparison = load_comparison(script, size)
+    comparison = load_comparison(script, size).of_parts(tasks, methods)
     known = {(c["task"], c["method"], c["seed"]): c for c in stored_cells(folder)}
     cells: list[dict[str, Any]] = []
     missing = []
