@@ -55,6 +55,7 @@ def test_a_worker_lost_in_the_middle_loses_no_trial(script, tmp_path, cluster, e
     assert outcomes(result) == outcomes(study.run(tmp_path / "alone", progress=None))
 
 
+@pytest.mark.slow
 def test_a_worker_that_hangs_is_ended_and_its_trial_has_failed(script, tmp_path, cluster, executor, monkeypatch):
     settings = "search='sobol', seed_points=6, iterations=0, time_limit=2.0"
     file = script("if self.trial == 2: time.sleep(1000)", settings)

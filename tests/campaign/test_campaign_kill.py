@@ -89,8 +89,8 @@ def kill_at_random(tmp_path, start, whole, times):
     assert partway > times / 3
 
 
-def test_sigkill_at_12_random_instants_loses_no_finished_trial_and_changes_no_later_one(tmp_path, start, whole):
-    kill_at_random(tmp_path, start, whole, 12)
+def test_sigkill_at_8_random_instants_loses_no_finished_trial_and_changes_no_later_one(tmp_path, start, whole):
+    kill_at_random(tmp_path, start, whole, 8)
 
 
 @pytest.mark.slow

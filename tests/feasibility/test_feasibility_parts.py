@@ -198,7 +198,7 @@ def test_the_start_is_judged_where_the_robot_is_known_from_a_model_alone():
     assert verdicts(check(Study(plant=plant, mpc=LinearMPC(MODEL), task=task)))["start"] == "doubtful"
 
 
-@pytest.mark.parametrize("task", [Circle(), Origin()])
+@pytest.mark.parametrize("task", [Circle(), pytest.param(Origin(), marks=pytest.mark.slow)])
 def test_the_settled_error_is_what_the_identified_controller_flies_with(task):
     """The check's linear flight against the rod itself, 20 s, to a quarter."""
     asked = study(task=task)

@@ -129,6 +129,7 @@ def test_play_moves_the_rod_in_time_and_pause_holds_it(browser):
     assert by_id(browser, "play").text == "Play"
 
 
+@pytest.mark.slow
 def test_it_plays_to_its_end_and_begins_anew(browser):
     browser.execute_script("document.getElementById('speed').value = '5'")
     by_id(browser, "play").click()

@@ -269,7 +269,7 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize("priors", [False, True])
+@pytest.mark.parametrize("priors", [pytest.param(False, marks=pytest.mark.slow), True])
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_no_data_drive_the_hyperparameters_out_of_sensible_bounds(kind, priors):
     points = np.random.default_rng(0).random((25, 2))

@@ -48,6 +48,7 @@ def test_the_best_that_keeps_a_limit_is_found_on_its_border():
     assert sum(trial.theta.sum() > 1.1 for trial in search.trials[6:]) <= 4
 
 
+@pytest.mark.slow
 def test_two_limits_are_kept_at_once():
     search = Optimizer(cube(2), seed=0, seed_points=6, limits={"sum": 1.0, "first": 0.3})
     for _ in range(15):

@@ -12,14 +12,24 @@ from socasadi.tune import Optimizer, SobolSearch
 from socasadi.tune._belief import last_full_fit
 
 
-@pytest.mark.parametrize("seeds", [1, pytest.param(3, marks=pytest.mark.slow)])
-def test_branin_is_solved_in_30_trials_and_sobol_is_far(seeds):
-    """Of a function that spans 300 it ends within 0.01 of the minimum in the median of the seeds."""
-    found = [run(Optimizer(BRANIN, seed=seed, seed_points=6), branin, 30).best.cost for seed in range(seeds)]
-    sobol = [run(SobolSearch(BRANIN, seed=seed), branin, 30).best.cost for seed in range(seeds)]
+def branin_in_30_trials(seeds):
+    """The best of the search and of Sobol points, by seed; the function spans 300."""
+    found = [run(Optimizer(BRANIN, seed=seed, seed_points=6), branin, 30).best.cost for seed in seeds]
+    return np.array(found), [run(SobolSearch(BRANIN, seed=seed), branin, 30).best.cost for seed in seeds]
+
+
+def test_branin_is_nearly_solved_in_30_trials_and_sobol_is_far():
+    found, sobol = branin_in_30_trials([0])
+    assert found - BRANIN_MINIMUM < 0.05
+    assert found < sobol
+
+
+@pytest.mark.slow
+def test_branin_is_solved_in_the_median_of_three_seeds():
+    found, sobol = branin_in_30_trials(range(3))
     assert np.median(found) - BRANIN_MINIMUM < 0.01
     assert max(found) - BRANIN_MINIMUM < 0.05
-    assert np.all(np.array(found) < sobol)
+    assert np.all(found < sobol)
 
 
 def test_sphere_in_six_dimensions_beats_sobol_at_equal_budget():
