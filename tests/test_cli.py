@@ -1,5 +1,7 @@
 """The command, as a user runs it."""
 
+import contextlib
+import io
 import json
 import os
 import re
@@ -7,13 +9,16 @@ import shutil
 import signal
 import subprocess
 import sys
+import warnings
 from importlib.metadata import version
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from socasadi import cli
 from socasadi.campaign import Journal, Result
 from socasadi.codegen import c_compiler
 from socasadi.export import toolchain
@@ -34,8 +39,23 @@ def study(folder, *, rod="paper", mpc="", task="Circle(duration=1.0)", seed_poin
 
 
 def socasadi(*arguments, cwd, **environment):
+    """The command; in this process, which has imported all that it needs, unless the environment is to differ."""
     command = [sys.executable, "-m", "socasadi.cli", *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env={**os.environ, **environment})
+    if environment:
+        return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env={**os.environ, **environment})
+    said, complained, code = io.StringIO(), io.StringIO(), 0
+    with (
+        contextlib.chdir(cwd),
+        contextlib.redirect_stdout(said),
+        contextlib.redirect_stderr(complained),
+        mock.patch.object(sys, "argv", ["socasadi", *map(str, arguments)]),
+        mock.patch.object(warnings, "showwarning"),
+    ):
+        try:
+            cli.main()
+        except SystemExit as ended:
+            code = ended.code or 0
+    return subprocess.CompletedProcess(command, code, said.getvalue(), complained.getvalue())
 
 
 @pytest.fixture(scope="module")

@@ -68,6 +68,7 @@ def test_a_worker_that_hangs_is_ended_and_its_trial_has_failed(script, tmp_path,
     assert len(before - workers(cluster)) == 1
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_dies_ends_the_run_in_a_sentence_and_resuming_finishes_it(script, tmp_path, monkeypatch):
     monkeypatch.setattr(_dask, "_PATIENCE", 5.0)
     file = script("time.sleep(0.01)")

@@ -250,6 +250,7 @@ class TestTimeouts:
         assert len(result.episode(3).output) == 1
         assert signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
 
+    @pytest.mark.slow
     def test_a_worker_that_hears_nothing_is_ended_and_another_takes_its_place(self, script, tmp_path, monkeypatch):
         deaf = "signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM]); time.sleep(1000)"
         settings = "search='sobol', seed_points=6, iterations=0, time_limit=2.0"

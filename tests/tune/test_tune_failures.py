@@ -30,6 +30,7 @@ def check_plateau(d, seed, trials):
     assert half.best.cost - 0.1 < 5 * (free.best.cost - 0.1) + 0.01
 
 
+@pytest.mark.slow
 def test_half_of_a_box_of_six_dimensions_may_fail():
     check_plateau(6, 0, 25)
 
