@@ -68,10 +68,12 @@ def compare(
         shown = [{k: v for k, v in row.items() if k not in ("task", "knows")} for row in rows if row["task"] == task]
         title = f"\n{task}, after {summary.checkpoints[-1]} episodes' worth of the robot's time:"
         out.print(table(shown, left=("method",), title=title))
-    out.print(table(_rivals(summary), left=("method", "knows"), title=f"\n{summary.methods[0]} against, in J:"))
+    if rivals := _rivals(summary):
+        out.print(table(rivals, left=("method", "knows"), title=f"\n{summary.methods[0]} against, in J:"))
     files = [_written(rows, folder / "table.csv")]
     for task in comparison.elsewhere_on:
-        others = _elsewhere(summary, task)
+        if not (others := _elsewhere(summary, task)):
+            continue  # no method had a controller to fly there
         out.print(table(others, left=("method",), title=f"\n{task}, J on other robots:"))
         files.append(_written(others, folder / f"elsewhere-{task}.csv"))
     drawn = save_figures(comparison_figures(summary, comparison, size), folder / "figures")

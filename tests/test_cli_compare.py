@@ -10,6 +10,21 @@ import pytest
 
 from socasadi.codegen import c_compiler
 
+NOTHING = """
+from socasadi import Circle, LinearMPC, Modal, Rod, SimulatedPlant, Study
+from socasadi.baselines import Comparison, DeadCable, Identified
+
+study = Study(plant=SimulatedPlant(Rod.preset("paper")), mpc=LinearMPC(Modal()), task=Circle(duration=1.0))
+comparison = Comparison(
+    study=study,
+    tasks={"circle": study.task},
+    methods={"too long": Identified(probing=20.0)},
+    seeds=(0,),
+    checkpoints=(1, 2),
+    elsewhere={"dead": DeadCable()},
+    elsewhere_on=("circle",),
+)
+"""
 ROOT = Path(__file__).parents[1]
 
 
@@ -55,6 +70,14 @@ def test_given_again_it_flies_nothing_and_tells_the_same(smoke):
     again = compare(ROOT / "studies" / "compare.py", "--smoke", *only, cwd=folder)
     assert "[1/" not in again.stdout
     assert again.stdout.splitlines()[-30:] == done.stdout.splitlines()[-30:]
+
+
+def test_a_method_that_has_nothing_to_offer_is_told_as_that(tmp_path):
+    (tmp_path / "script.py").write_text(NOTHING)
+    done = compare("script.py", "--jobs", "1", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "no controller within its time" in done.stdout
+    assert (tmp_path / "runs" / "script-full" / "figures" / "cost.png").exists()
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,7 @@ def comparison_figures(summary: Summary, comparison: Comparison, size: str) -> d
             "methods": _methods(summary, note),
             "paths": _paths(summary, comparison, factor, unit, note),
         }
-        for task in comparison.elsewhere_on:
+        for task in (task for task in comparison.elsewhere_on if summary.elsewhere(task)[1]):
             drawn[f"elsewhere-{task}" if len(comparison.elsewhere_on) > 1 else "elsewhere"] = _elsewhere(
                 summary, task, note
             )
@@ -120,6 +120,8 @@ def _methods(summary: Summary, note: str) -> Figure:
         if not summary.of_pair(task, summary.methods[0]):
             continue
         ours = float(np.median(summary.values(task, summary.methods[0], "J")))
+        if not np.isfinite(ours):
+            continue  # nothing to compare with
         for row, method in zip(rows, summary.methods, strict=True):
             if not summary.of_pair(task, method):
                 continue

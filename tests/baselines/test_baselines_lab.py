@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from baselines_support import SYSTEM, THETA, LinearPlant, study
+from baselines_support import SYSTEM, THETA, LinearPlant, study, watched
 
 from socasadi.baselines import BudgetSpent, Identified, Lab, Method, ModelSearch, static_gain, tuned
 from socasadi.campaign import Pilot
@@ -49,19 +49,11 @@ def test_the_search_of_a_model_is_the_campaign_itself(tmp_path):
     """The same points, flown under the same noise, cut at the same sample, as Study.run has them."""
     made = study(LinearPlant(noise=1e-3))
     result = made.run(tmp_path / "run", progress=None)
-    lab, costs = Lab(made, (8 * 6.0,)), []
-    fly = lab.fly
-
-    def watched(pilot, **given):
-        episode = fly(pilot, **given)
-        costs.append(lab.cost(episode))
-        return episode
-
-    lab.fly = watched
-    offers = []
+    lab = Lab(made, (8 * 6.0,))
+    costs, offers = watched(lab), []
     with pytest.raises(BudgetSpent):
         offers.extend(ModelSearch().offers(lab))
-    assert costs[: len(result.trials)] == [trial.J for trial in result.trials]
+    assert costs[: len(result.trials)] == [np.inf if trial.J is None else trial.J for trial in result.trials]
 
 
 @pytest.mark.parametrize("kind", ["bayesian", "sobol", "random"])
@@ -81,15 +73,8 @@ def test_a_search_for_robustness_counts_the_worst_robot_or_the_mean_and_pays_for
             return super().step(0.6 * np.asarray(tension))
 
     def told(by):
-        lab, costs = Lab(study(), (5 * 12.0,)), []
-        fly = lab.fly
-
-        def watched(pilot, **given):
-            episode = fly(pilot, **given)
-            costs.append(lab.cost(episode) or np.inf)
-            return episode
-
-        lab.fly = watched
+        lab = Lab(study(), (5 * 12.0,))
+        costs = watched(lab)
         entries = (Entry("x", "1", 0.5, 2.0, "log"),)
         mpc = replace(lab.study.mpc, tuned=("R",))
         build = lambda x: mpc.controller([*THETA, *x])  # noqa: E731

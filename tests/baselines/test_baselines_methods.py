@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from baselines_support import SYSTEM, LinearPlant, rod_study, study
+from baselines_support import SYSTEM, LinearPlant, rod_study, study, watched
 
 from socasadi import SetPoints
 from socasadi.baselines import (
@@ -143,15 +143,8 @@ def test_n4sid_finds_the_response_of_the_robot():
 def test_learning_from_flight_to_flight_lowers_the_cost_where_nothing_else_changes():
     """Without noise, on a circle that the loop cannot foresee well: each flight costs no more than the one before."""
     made = study(LinearPlant(), preview=1)
-    lab, costs = Lab(made, (120.0,)), []
-    fly = lab.fly
-
-    def watched(pilot, **given):
-        episode = fly(pilot, **given)
-        costs.append(lab.cost(episode))
-        return episode
-
-    lab.fly = watched
+    lab = Lab(made, (120.0,))
+    costs = watched(lab)
     last_offer(IterativeLearning(probing=10.0, caution=0.1), lab)
     assert np.all(np.diff(costs[:8]) < 1e-3 * costs[0])
     assert costs[7] < 0.9 * costs[0]
