@@ -145,7 +145,8 @@ class Believer:
         """The trial of least expected cost among those with that property.
 
         Reckons with what the trials leave open of the hyperparameters, of the noise above all: the fitted ones alone
-        would be too sure.
+        would be too sure. The trial that was observed as the best gives way only to one that is better under all of
+        them: while there are few trials, some hold all differences for noise.
         """
         data, rows = belief.data, belief.rows_that(keep)
         if noise_seen(belief.trials) is False:
@@ -161,7 +162,10 @@ class Believer:
         told = [condition(one, data.points, data.targets[:, None], one.noise + data.known) for one in drawn]
         means, deviations = zip(*(process.predict(data.points[rows]) for process in told), strict=True)
         means = np.hstack(means)
-        best = int(means.mean(axis=1).argmin())
+        observed = data.targets[rows].argmin()
+        surer = (means < means[observed]).all(axis=1)
+        surer[observed] = True
+        best = int(np.where(surer, means.mean(axis=1), np.inf).argmin())
         chances = _quantiles(means[best], np.array(deviations)[:, best], (0.05, 0.5, 0.95))
         low, middle, high = data.restore(chances).tolist()
         index = int(data.rows[rows[best]])

@@ -58,6 +58,19 @@ def test_without_noise_the_best_estimated_is_the_best_observed_and_sure():
     assert estimate.high - estimate.low < 0.02
 
 
+def test_after_six_trials_of_a_steep_cost_a_much_worse_one_is_hardly_ever_taken():
+    def steep(theta):
+        return 3 + 4 * float(np.exp(6 * np.sum((theta - 0.4) ** 2)))
+
+    worse = 0
+    for seed in range(12):
+        rng, search = np.random.default_rng(seed), Optimizer(cube(3), seed=seed)
+        for theta in rng.uniform(size=(6, 3)):
+            search.tell(theta, steep(theta) + 0.1 * rng.standard_normal())
+        worse += steep(search.best_estimated.theta) > steep(search.best.theta) + 0.5
+    assert worse <= 1
+
+
 def test_one_trial_alone_says_nothing_of_its_noise_and_neither_do_space_filling_points():
     for search in (Optimizer(cube(2)), SobolSearch(cube(2))):
         assert search.best_estimated is None
