@@ -85,14 +85,14 @@ class Program:
 
     .. math:: \min_z\; \sum_{k=1}^{N} |y_k - r_k|_Q^2 + \rho_R(u) + \lambda |s|^2 + z'Hz/2 + (g p)'z
 
-    within the bounds of an MPC, whose weights these are; bounds of outputs are soft. It is solved by the project's own
-    solver in C.
+    within the bounds of an MPC, whose weights these are, R multiplied by ``effort``; bounds of outputs are soft. It is
+    solved by the project's own solver in C.
     """
 
-    def __init__(self, mpc: LinearMPC, forecast: Forecast) -> None:
+    def __init__(self, mpc: LinearMPC, forecast: Forecast, effort: float = 1.0) -> None:
         (Au, Bu), (Ay, By), m = forecast.input, forecast.output, mpc.inputs
         horizon = len(Au) // m
-        R, Q = weight_matrix(mpc.R, m, "R"), weight_matrix(mpc.Q, mpc.outputs, "Q")
+        R, Q = effort * weight_matrix(mpc.R, m, "R"), weight_matrix(mpc.Q, mpc.outputs, "Q")
         weighed, offset = np.eye(len(Au)), np.zeros((len(Au), len(forecast.before[0])))
         if mpc.input_term == "rate":
             weighed = weighed - np.eye(len(Au), k=-m)

@@ -19,10 +19,11 @@ _WITHOUT_FLIGHT = 1000
 
 
 def search_for(kind: str, space: Space, study: Study, initial: Sequence[ArrayLike] = ()) -> Search:
-    """A fresh search by name, seeded as a campaign of the study."""
+    """A fresh search by name, seeded as a campaign of the study; few numbers take few points to start with."""
     match kind:
         case "bayesian":
-            return Optimizer(space, seed=study.seed, seed_points=study.seed_points, initial=initial)
+            seed_points = min(study.seed_points, 2 * space.dimension)
+            return Optimizer(space, seed=study.seed, seed_points=seed_points, initial=initial)
         case "sobol":
             return SobolSearch(space, study.seed)
         case "random":

@@ -22,8 +22,8 @@ class DeePC(Method):
         \min_g\; \sum |y - r|_Q^2 + \rho_R(u) + \lambda_g |g|^2 + \lambda_y |Y_p g - y_{ini}|^2, \qquad
         U_p g = u_{ini},\; u = U_f g,\; y = Y_f g
 
-    within the bounds of the study's MPC. How many samples make the past, and both regularisations are tuned by
-    flights.
+    within the bounds of the study's MPC. How many samples make the past, both regularisations, and a factor on R are
+    tuned by flights.
 
     Parameters
     ----------
@@ -45,12 +45,15 @@ class DeePC(Method):
             Entry("past", "samples", 4.0, 24.0, "log"),
             Entry("on the combination", "1", 1e-4, 1e3, "log"),
             Entry("on the past", "1/m2", 1e2, 1e8, "log"),
+            Entry("effort", "1", 0.01, 100.0, "log"),
         )
-        return tuned(lab, knobs, lambda x: _Controller(self, mpc, record, *x), initial=[(10.0, 1.0, 1e5)])
+        return tuned(lab, knobs, lambda x: _Controller(self, mpc, record, *x), initial=[(10.0, 1.0, 1e5, 1.0)])
 
 
 class _Controller(Law):
-    def __init__(self, method: DeePC, mpc: LinearMPC, record: Record, past: float, on_g: float, on_past: float) -> None:
+    def __init__(
+        self, method: DeePC, mpc: LinearMPC, record: Record, past: float, on_g: float, on_past: float, effort: float
+    ) -> None:
         super().__init__(mpc)
         m, p, past, N = mpc.inputs, mpc.outputs, round(past), method.horizon
         self._past, self._horizon, self._velocity = past, N, method.velocity
@@ -81,7 +84,7 @@ class _Controller(Law):
             2 * (on_g * np.eye(free.shape[1]) + on_past * (Yp @ free).T @ (Yp @ free)),
             2 * (on_g * free.T @ known + on_past * (Yp @ free).T @ missed),
         )
-        self._program = Program(mpc, Forecast(input, output, pick["reference"], pick["before"], own))
+        self._program = Program(mpc, Forecast(input, output, pick["reference"], pick["before"], own), effort)
         self.begin()
 
     def begin(self) -> None:

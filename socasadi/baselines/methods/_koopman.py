@@ -18,7 +18,8 @@ class Koopman(Method):
     predictive control", RSS 2019 (arXiv 1902.02827); Bruder et al., IEEE Trans. Robotics 37, 2020. The lifting holds
     outputs and inputs of the last samples, and monomials of the outputs among them; the lifted state comes from
     measurements at every sample. Beyond the papers a constant disturbance of the outputs is estimated, lest there is a
-    steady error. How many samples are lifted, the ridge of the fit and the gain of that estimate are tuned by flights.
+    steady error. How many samples are lifted, the ridge of the fit, the gain of that estimate and a factor on R are
+    tuned by flights.
 
     Parameters
     ----------
@@ -40,13 +41,21 @@ class Koopman(Method):
             Entry("delays", "samples", 1.5, 8.5, "log"),
             Entry("ridge", "1", 1e-6, 1e1, "log"),
             Entry("gain of the disturbance", "1", 0.01, 1.0, "log"),
+            Entry("effort", "1", 0.01, 100.0, "log"),
         )
-        return tuned(lab, knobs, lambda x: _Controller(self, mpc, record, *x), initial=[(5.0, 1e-3, 0.2)])
+        return tuned(lab, knobs, lambda x: _Controller(self, mpc, record, *x), initial=[(5.0, 1e-3, 0.2, 1.0)])
 
 
 class _Controller(Law):
     def __init__(
-        self, method: Koopman, mpc: LinearMPC, record: Record, delays: float, ridge: float, gain: float
+        self,
+        method: Koopman,
+        mpc: LinearMPC,
+        record: Record,
+        delays: float,
+        ridge: float,
+        gain: float,
+        effort: float,
     ) -> None:
         super().__init__(mpc)
         self._delays = d = round(delays)
@@ -72,7 +81,7 @@ class _Controller(Law):
         known_part = np.hstack([by_state, np.tile(np.eye(p), (N, 1)), np.zeros((N * p, N * p + m))])
         reference = np.eye(total)[size + p : size + p + N * p]
         inputs = (np.eye(N * m), np.zeros((N * m, total)))
-        self._program = Program(mpc, Forecast(inputs, (by_input, known_part), reference, np.eye(total)[-m:]))
+        self._program = Program(mpc, Forecast(inputs, (by_input, known_part), reference, np.eye(total)[-m:]), effort)
         self.begin()
 
     def begin(self) -> None:
@@ -101,9 +110,9 @@ class _Controller(Law):
     def _lift(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Newest first: outputs (delays + 1, p), m, and inputs (delays, m), as shares -> the lifted state."""
         y = y.ravel() / self._unit
+        factors = range(min(len(y), 4))
         monomials = [
-            np.prod(y[list(chosen)])
+            y[list(combinations_with_replacement(factors, degree))].prod(axis=1)
             for degree in range(2, self._method.degree + 1)
-            for chosen in combinations_with_replacement(range(min(len(y), 4)), degree)
         ]
-        return np.concatenate([y, u.ravel(), monomials, [1.0]])
+        return np.concatenate([y, u.ravel(), *monomials, [1.0]])

@@ -2,14 +2,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import casadi as ca
 import numpy as np
 
 from ...campaign import Pilot
 from ...codegen import Buffered, compiled
+from ...model import Fixed
 from ...mpc import LinearMPC
 from ...plant import SimulatedPlant
 from ...rod import Strain
-from ..lab import Forecast, Information, Lab, Law, Method, Program, looked_ahead
+from ..lab import Forecast, Information, Lab, Law, Method, Program, looked_ahead, tuned
+from ._fixed import linearised
 from ._sampled import sampled
 
 
@@ -20,7 +23,8 @@ class NonlinearMPC(Method):
     Gauss-Newton sequential quadratic programming (Diehl, Bock, Schlöder, "A real-time iteration scheme for nonlinear
     optimization in optimal feedback control", SIAM J. Control and Optimization 43, 2005), each program started from the
     solution before, on states that an extended Kalman filter estimates along with a constant disturbance of the
-    outputs. Weights, bounds and noise are those of the study's MPC.
+    outputs. The bounds are those of the study's MPC; what it weighs and what the observer assumes is tuned by flights,
+    as in :class:`WeightSearch`.
 
     Parameters
     ----------
@@ -31,14 +35,17 @@ class NonlinearMPC(Method):
         Samples that are looked ahead.
     iterations
         Programs a sample.
+    tuned
+        Settings of the study's MPC that are tuned, each within two decades.
     doubt
-        A factor on the unknown input that the study's MPC assumes: a model that is the robot itself may be trusted, and
-        one of constant curvature may not.
+        The factor on ``"input_noise"`` that is flown first: a model that is the robot itself may be trusted, and one of
+        constant curvature may not.
     """
 
     model: Literal["rod", "constant curvature"] = "rod"
     horizon: int = 20
-    iterations: int = 2
+    iterations: int = 1
+    tuned: tuple[str, ...] = ("R", "input_noise", "disturbance_noise")
     doubt: float = 0.01
 
     @property
@@ -52,15 +59,23 @@ class NonlinearMPC(Method):
         rod = plant.rod
         if self.model == "constant curvature":
             rod = replace(rod, strain=Strain(bending_y=0, bending_z=0))
-        yield _Controller(lab.study.mpc, SimulatedPlant(rod, plant.sample_time, 0.0, plant.output), self)
+        believed = SimulatedPlant(rod, plant.sample_time, 0.0, plant.output)
+        advance = compiled(sampled(believed, plant.inputs))
+        # The rod takes the place of the model, so that nothing but the settings is left open.
+        searched = replace(lab.study.mpc, model=Fixed.of(linearised(lab), plant.sample_time), tuned=self.tuned)
+        first = [self.doubt if name == "input_noise" else 1.0 for name in self.tuned]
+
+        def build(factors: np.ndarray) -> Pilot:
+            return _Controller(searched.at(factors), believed, advance, self)
+
+        return tuned(lab, searched.entries, build, initial=[first])
 
 
 class _Controller(Law):
-    def __init__(self, mpc: LinearMPC, plant: SimulatedPlant, method: NonlinearMPC) -> None:
+    def __init__(self, mpc: LinearMPC, plant: SimulatedPlant, advance: ca.Function, method: NonlinearMPC) -> None:
         super().__init__(mpc)
-        self._rod, self._method = plant.rod, method
-        self._advance = Buffered(compiled(sampled(plant, mpc.inputs)))
-        self._rest = plant.sensor
+        self._rod, self._method, self._rest = plant.rod, method, plant.sensor
+        self._advance = Buffered(advance)
         self.begin()
 
     def begin(self) -> None:
@@ -101,7 +116,7 @@ class _Controller(Law):
             self._x, A, B, expected, C = self._sample(self._x, self.held)
             self._covariance[:n] = A @ self._covariance[:n]
             self._covariance[:, :n] = self._covariance[:, :n] @ A.T
-            self._covariance[:n, :n] += self._method.doubt**2 * B @ noise.input @ B.T
+            self._covariance[:n, :n] += B @ noise.input @ B.T
             self._covariance[n:, n:] += noise.disturbance
         self._first = False
         seen = np.hstack([C, np.eye(p)])
