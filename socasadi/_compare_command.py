@@ -27,6 +27,7 @@ def compare(
     methods: Annotated[
         list[str] | None, typer.Option("--method", metavar="NAME", help="Only this method; repeatable.")
     ] = None,
+    seeds: Annotated[int | None, typer.Option(metavar="N", help="Only the first N seeds.")] = None,
     jobs: Annotated[int | None, typer.Option(help="How many cells at once; all processors by default.")] = None,
     dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers fly them.")] = None,
     folder: Annotated[Path | None, typer.Option("--out", help="Its results; runs/NAME-SIZE by default.")] = None,
@@ -40,7 +41,8 @@ def compare(
     if jobs is not None and jobs < 1:
         raise RunError(f"--jobs is at least 1, not {jobs}")
     size = "smoke" if smoke else "quick" if quick else "full"
-    comparison = load_comparison(script, size).of_parts(tasks or (), methods or ())
+    parts = {"tasks": tasks or (), "methods": methods or (), "seeds": seeds}
+    comparison = load_comparison(script, size).of_parts(**parts)
     folder = folder or Path("runs") / f"{script.stem}-{size}"
     out.print(
         f"{script}, {size}: {len(comparison.methods)} methods, {len(comparison.tasks)} tasks, {len(comparison.seeds)} "
@@ -58,7 +60,7 @@ def compare(
         with interruptible(), ExitStack() as stack:
             here = jobs or os.cpu_count() or 1
             executor = stack.enter_context(dask_executor(dask) if dask else Processes(here))
-            cells = run_comparison(script, size, folder, executor, told, tasks=tasks or (), methods=methods or ())
+            cells = run_comparison(script, size, folder, executor, told, **parts)
     except KeyboardInterrupt:
         out.print("\nStopped. Every finished cell is stored; the same command goes on.")
         raise typer.Exit(130) from None

@@ -3,6 +3,7 @@
     socasadi compare studies/compare.py --smoke       does it work: under two minutes
     socasadi compare studies/compare.py --quick       three seeds, 30 episodes' worth of the robot's time
     socasadi compare studies/compare.py               ten seeds, 110 episodes' worth; goes on where it was stopped
+    socasadi compare studies/compare.py --seeds 3     the same of three seeds, which are the first of the ten
 
 All methods are lent the same simulated arm for the same time, and their controllers are flown under noise that none has
 seen. The first method is the one that the others are compared with.

@@ -26,6 +26,7 @@ from socasadi.baselines import (
     fly_cell,
     load_comparison,
     run_comparison,
+    stored_cells,
     summary_table,
 )
 from socasadi.campaign import Pilot, RunError
@@ -143,13 +144,30 @@ def test_cells_are_kept_and_only_what_is_missing_or_changed_is_flown(tmp_path):
     same = run_comparison(script, "full", out, again)
     assert again.done == 0
     assert sorted(map(str, same)) == sorted(map(str, cells))
-    # A cell that was cut off by a full disk, and one of other settings.
-    files = sorted(out.glob("*/*.json"))
-    files[0].write_text(files[0].read_text()[:100])
+    # A full disk cut the last cell off, and of one method the settings are others.
+    kept = out / "cells.jsonl"
+    kept.write_bytes(kept.read_bytes()[:-100])
+    of_lost = cells[-1]["method"] == "identified"
     script.write_text(SCRIPT.replace("Identified(6.0)", "Identified(5.0)"))
     some = Here()
-    run_comparison(script, "full", out, some)
-    assert some.done == 4 + ("identified" not in files[0].name)
+    changed = run_comparison(script, "full", out, some)
+    assert some.done == 4 + (not of_lost)
+    assert len(list(stored_cells(out))) == 7 + some.done  # what is written after a torn line is not lost with it
+    # Settings that were flown before are known again.
+    script.write_text(SCRIPT)
+    assert len(changed) == len(run_comparison(script, "full", out, some)) == 8
+    assert some.done == 5
+
+
+def test_workers_that_know_an_older_script_are_not_believed(tmp_path):
+    class Stale(Here):
+        def submit(self, fn, /, *args, **kwargs):
+            return super().submit(fn, str(old), *args[1:], **kwargs)
+
+    (old := tmp_path / "old.py").write_text(SCRIPT)
+    (script := tmp_path / "script.py").write_text(SCRIPT.replace("Identified(6.0)", "Identified(5.0)"))
+    with pytest.raises(RunError, match=r"a worker knows another script\.py"):
+        run_comparison(script, "full", tmp_path / "out", Stale())
 
 
 def test_a_cell_whose_worker_dies_is_flown_again_and_one_that_kills_them_ends_the_comparison_in_a_sentence(tmp_path):
@@ -200,8 +218,11 @@ def test_some_of_its_parts_are_flown_by_themselves():
     assert list(some.methods) == ["better", "never"]
     assert list(some.tasks) == ["circle"]
     assert list(comparison().of_parts().methods) == ["better", "broken", "never"]
+    assert comparison(seeds=(3, 1, 2)).of_parts(seeds=2).seeds == (3, 1)
     with pytest.raises(ValueError, match="no task 'square'; there are circle"):
         comparison().of_parts(tasks=["square"])
+    with pytest.raises(ValueError, match="2 seeds, of which the first 3 cannot be taken"):
+        comparison(seeds=(0, 1)).of_parts(seeds=3)
     assert some.digest("circle", "never", 0) == comparison().digest("circle", "never", 0)
 
 

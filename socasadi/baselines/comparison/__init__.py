@@ -3,8 +3,9 @@
 from ._cell import fly_cell
 from ._comparison import Comparison, Size
 from ._judge import Elsewhere, Worth, worth, worth_elsewhere
+from ._kept import stored_cells
 from ._others import DeadCable, Delayed, Loaded, Misrouted, Noisier, Rubbing, Softer
-from ._run import load_comparison, run_comparison, stored_cells
+from ._run import load_comparison, run_comparison
 from ._summary import Summary, summary_table
 
 __all__ = [

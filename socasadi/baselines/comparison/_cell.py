@@ -71,12 +71,12 @@ def _flown(comparison: Comparison, task: str, method: str, seed: int) -> dict[st
 
 
 def _finite(value: Any) -> Any:
-    """JSON data in which what is not a finite number is null."""
+    """JSON data, numbers to seven digits, in which what is not a finite number is null."""
     match value:
         case dict():
             return {key: _finite(item) for key, item in value.items()}
         case list() | tuple():
             return [_finite(item) for item in value]
-        case float() if not np.isfinite(value):
-            return None
+        case float():
+            return float(f"{value:.7g}") if np.isfinite(value) else None
     return value

@@ -84,21 +84,26 @@ class Comparison:
                 return replace(self, tasks=tasks, **few, elsewhere=others, elsewhere_on=on)
         raise ValueError(f"a comparison is of size {', '.join(get_args(Size))}, not {size!r}")
 
-    def of_parts(self, tasks: Sequence[str] = (), methods: Sequence[str] = ()) -> "Comparison":
-        """Some of its tasks and methods; none named is all.
+    def of_parts(
+        self, tasks: Sequence[str] = (), methods: Sequence[str] = (), seeds: int | None = None
+    ) -> "Comparison":
+        """Some of its tasks and methods, and the first so many of its seeds; none given is all.
 
         Raises
         ------
         ValueError
-            There is no such task or method.
+            There is no such task or method, or there are not so many seeds.
         """
+        count = len(self.seeds) if seeds is None else seeds
+        if not 1 <= count <= len(self.seeds):
+            raise ValueError(f"there are {len(self.seeds)} seeds, of which the first {count} cannot be taken")
         for kind, names, known in (("task", tasks, self.tasks), ("method", methods, self.methods)):
             if unknown := [name for name in names if name not in known]:
                 raise ValueError(f"there is no {kind} {unknown[0]!r}; there are {', '.join(known)}")
         kept = {name: task for name, task in self.tasks.items() if not tasks or name in tasks}
         flown = {name: method for name, method in self.methods.items() if not methods or name in methods}
         on = tuple(name for name in self.elsewhere_on if name in kept)
-        return replace(self, tasks=kept, methods=flown, elsewhere_on=on)
+        return replace(self, tasks=kept, methods=flown, seeds=tuple(self.seeds)[:count], elsewhere_on=on)
 
     def of(self, task: str, seed: int) -> Study:
         """The study of a task and a seed."""

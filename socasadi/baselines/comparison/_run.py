@@ -1,9 +1,8 @@
 """All cells of a comparison, flown side by side and kept in a folder."""
 
 import json
-import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from ...campaign import load_script
 from ...campaign.store import RunError
 from ._cell import fly_cell
 from ._comparison import Comparison, Size
+from ._kept import store_cell, stored_cells
 
 _LOSSES = 2
 """Times that a cell is flown again when its worker has died."""
@@ -33,13 +33,7 @@ def load_comparison(script: Path, size: Size = "full") -> Comparison:
 
 def order_cell(script: str, size: Size, task: str, method: str, seed: int) -> str:
     """:func:`fly_cell` in another process, which runs the script again; JSON."""
-    key = script, size
-    if key not in _loaded:
-        _loaded[key] = load_comparison(Path(script), size)
-    return json.dumps(fly_cell(_loaded[key], task, method, seed))
-
-
-_loaded: dict[tuple[str, str], Comparison] = {}
+    return json.dumps(fly_cell(load_comparison(Path(script), size), task, method, seed))
 
 
 def run_comparison(
@@ -51,6 +45,7 @@ def run_comparison(
     *,
     tasks: Sequence[str] = (),
     methods: Sequence[str] = (),
+    seeds: int | None = None,
 ) -> list[dict[str, Any]]:
     """Fly all cells that ``folder`` does not hold yet, each stored when it is done; return them all.
 
@@ -60,24 +55,23 @@ def run_comparison(
         Where they are flown: it is sent names and answers by text.
     progress
         Is told each cell that is done, how many are, and of how many.
-    tasks, methods
-        Names of those that are flown; none is all.
+    tasks, methods, seeds
+        As of :meth:`Comparison.of_parts`.
 
     Raises
     ------
     RunError
         No worker can fly a cell, or they die of one; what was done is stored.
     """
-    comparison = load_comparison(script, size).of_parts(tasks, methods)
-    known = {(c["task"], c["method"], c["seed"]): c for c in stored_cells(folder)}
+    comparison = load_comparison(script, size).of_parts(tasks, methods, seeds)
+    known = {(c["task"], c["method"], c["seed"], c["digest"]): c for c in stored_cells(folder)}
     cells: list[dict[str, Any]] = []
     missing = []
-    for task, method, seed in comparison.cells:
-        cell = known.get((task, method, seed))
-        if cell is not None and cell["digest"] == comparison.digest(task, method, seed):
+    for names in comparison.cells:
+        if cell := known.get((*names, comparison.digest(*names))):
             cells.append(cell)
         else:
-            missing.append((task, method, seed))
+            missing.append(names)
     total, losses = len(comparison.cells), Counter()
     waiting: dict[Future, tuple[str, str, int]] = {}
 
@@ -100,30 +94,15 @@ def run_comparison(
                 except Exception as error:
                     raise RunError(f"{', '.join(map(str, names))}: {error}") from error
                 else:
-                    _store(folder, cell)
+                    if cell["digest"] != comparison.digest(*names):
+                        raise RunError(
+                            f"{', '.join(map(str, names))}: a worker knows another {script.name}: it was edited, or the "
+                            "worker is older; restart the workers and give the command again"
+                        )
+                    store_cell(folder, cell)
                     cells.append(cell)
                     progress(cell, len(cells), total)
     finally:
         for future in waiting:
             future.cancel()
     return cells
-
-
-def stored_cells(folder: Path) -> Iterator[dict[str, Any]]:
-    """The cells that a folder holds; what is no cell is left out."""
-    for file in sorted(folder.glob("*/*.json")):
-        try:
-            cell = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            continue
-        if isinstance(cell, dict) and "digest" in cell:
-            yield cell
-
-
-def _store(folder: Path, cell: dict[str, Any]) -> None:
-    name = "".join(c if c.isalnum() else "-" for c in cell["method"])
-    file = folder / cell["task"].replace(" ", "-") / f"{name}-{cell['seed']}.json"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    part = file.with_name(f"{file.name}.part")
-    part.write_text(json.dumps(cell), encoding="utf-8")
-    os.replace(part, file)

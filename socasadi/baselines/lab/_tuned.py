@@ -40,6 +40,7 @@ def tuned(
     initial: Sequence[ArrayLike] = (),
     over: Sequence[Callable[[Plant], Plant]] = (),
     by: Literal["mean", "worst"] = "mean",
+    most: float = np.inf,
 ) -> Iterator[Pilot]:
     """Fly what ``build`` makes of the knobs' values, and look for the best until the time is spent.
 
@@ -61,10 +62,12 @@ def tuned(
         robot's time in turn.
     by
         What counts of the several J.
+    most
+        Trials after which the best so far is left as it is, though there be time.
     """
     study, search, in_vain = lab.study, search_for(kind, Space(knobs), lab.study, initial), 0
     plants = [None, *(other(study.plant) for other in over)]
-    while in_vain < _WITHOUT_FLIGHT:
+    while in_vain < _WITHOUT_FLIGHT and len(search.trials) < most:
         theta, number = search.ask(), len(search.trials) + 1
         try:
             pilot = build(theta)
@@ -76,7 +79,7 @@ def tuned(
         give_up = None if best is None or study.give_up is None else study.give_up * best
         in_vain = 0
         _tell(search, theta, _flown(lab, pilot, plants, by, give_up, number))
-        if lab.due(len(plants)) and (chosen := search.best_estimated or search.best) is not None:
+        if (lab.due(len(plants)) or number >= most) and (chosen := search.best_estimated or search.best) is not None:
             yield build(chosen.theta)
 
 

@@ -40,6 +40,8 @@ class NonlinearMPC(Method):
     doubt
         The factor on ``"input_noise"`` that is flown first: a model that is the robot itself may be trusted, and one of
         constant curvature may not.
+    trials
+        Of the tuning, at most: seconds of computing each.
     """
 
     model: Literal["rod", "constant curvature"] = "rod"
@@ -47,6 +49,7 @@ class NonlinearMPC(Method):
     iterations: int = 1
     tuned: tuple[str, ...] = ("R", "input_noise", "disturbance_noise")
     doubt: float = 0.01
+    trials: int = 30
 
     @property
     def information(self) -> Information:
@@ -68,7 +71,7 @@ class NonlinearMPC(Method):
         def build(factors: np.ndarray) -> Pilot:
             return _Controller(searched.at(factors), believed, advance, self)
 
-        return tuned(lab, searched.entries, build, initial=[first])
+        return tuned(lab, searched.entries, build, initial=[first], most=self.trials)
 
 
 class _Controller(Law):
