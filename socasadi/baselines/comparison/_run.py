@@ -96,8 +96,8 @@ def run_comparison(
                 else:
                     if cell["digest"] != comparison.digest(*names):
                         raise RunError(
-                            f"{', '.join(map(str, names))}: a worker knows another {script.name}: it was edited, or the "
-                            "worker is older; restart the workers and give the command again"
+                            f"{', '.join(map(str, names))}: a worker knows another {script.name}, which was edited, or "
+                            "the worker is older: restart the workers, and give the command again"
                         )
                     store_cell(folder, cell)
                     cells.append(cell)
