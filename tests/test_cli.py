@@ -306,7 +306,7 @@ def test_a_run_folder_that_exists_needs_resume_and_the_same_settings(finished):
 def test_what_the_readme_and_the_guide_show_of_python_runs(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
     others = re.findall(r"```python\n(.*?)```", (ROOT / "studies" / "guide.md").read_text(), re.S)
-    assert len(others) == 6
+    assert len(others) == 7
     # One process, since each would spend most of its time on imports; each block has its own names.
     each = "\n".join(
         f"exec(compile({block!r}, 'block {i}', 'exec'), {{'__name__': '__main__'}})" for i, block in enumerate(others)

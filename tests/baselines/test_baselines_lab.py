@@ -31,6 +31,12 @@ def test_every_experiment_is_paid_by_the_second_and_none_is_begun_that_cannot_be
     assert (lab.flights, lab.probes, lab.failed) == (3, 1, 0)
 
 
+def test_a_method_without_a_controller_in_its_time_says_how_much_is_missing():
+    assert Identified(6.0).controller(Lab(study(), (6.0,))).mpc == study().mpc
+    with pytest.raises(BudgetSpent, match="Identified has no controller to offer: 0 s of 5 s are spent; 6"):
+        Identified(6.0).controller(Lab(study(), (5.0,)))
+
+
 def test_what_breaks_off_costs_what_it_flew_and_counts_as_failed():
     class Fragile(LinearPlant):
         def step(self, tension, tip_force=None):

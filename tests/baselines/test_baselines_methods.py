@@ -1,6 +1,5 @@
 """Each method against what is known of it from elsewhere."""
 
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,6 @@ from baselines_support import SYSTEM, LinearPlant, rod_study, study, watched
 from socasadi import SetPoints
 from socasadi.baselines import (
     PID,
-    BudgetSpent,
     DeePC,
     HInfinity,
     IterativeLearning,
@@ -32,13 +30,6 @@ from socasadi.model import StateSpace, subspace
 compiled = pytest.mark.skipif(c_compiler() is None, reason="its program is solved in C")
 
 
-def last_offer(method, lab):
-    offered = []
-    with suppress(BudgetSpent):
-        offered.extend(method.offers(lab))
-    return offered[-1]
-
-
 FEW = {
     "weights": (WeightSearch(probing=6.0), 1.2),
     "weights on N4SID": (WeightSearch("subspace", probing=12.0), 1.1),
@@ -57,7 +48,7 @@ def test_a_minute_with_the_arm_gives_a_controller_that_follows_the_circle(method
     """J within a factor of that of the MPC on the arm's own linearisation; not to move costs 300 times as much."""
     made = rod_study()
     (best,) = Linearised().offers(Lab(made, (60.0,)))
-    pilot = last_offer(method, Lab(made, (60.0,)))
+    pilot = method.controller(Lab(made, (60.0,)))
     flown, path = worth(made, pilot, 1)
     assert flown.J[0] < times * worth(made, best, 1)[0].J[0]
     assert flown.failed == flown.fallbacks == 0
@@ -68,7 +59,7 @@ def test_a_minute_with_the_arm_gives_a_controller_that_follows_the_circle(method
 def test_integral_action_leaves_no_steady_error(method):
     made = study(LinearPlant())
     lab = Lab(made, (64.0,))
-    pilot = last_offer(method, lab)
+    pilot = method.controller(lab)
     plant, wanted = LinearPlant(), np.array([[0.02, -0.01]])
     pilot.reset(0.0)
     y = plant.reset()
@@ -146,7 +137,7 @@ def test_learning_from_flight_to_flight_lowers_the_cost_where_nothing_else_chang
     made = study(LinearPlant(), preview=1)
     lab = Lab(made, (120.0,))
     costs = watched(lab)
-    last_offer(IterativeLearning(probing=10.0, caution=0.1), lab)
+    IterativeLearning(probing=10.0, caution=0.1).controller(lab)
     assert np.all(np.diff(costs[:8]) < 1e-3 * costs[0])
     assert costs[7] < 0.9 * costs[0]
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ...campaign import Pilot
-from ._lab import Lab
+from ._lab import BudgetSpent, Lab
 
 Information = Literal["data sheet", "plant model"]
 
@@ -28,3 +28,21 @@ class Method(ABC):
         What counts at a checkpoint is the last controller before it. The lab ends it all by :class:`BudgetSpent`, which
         is not to be caught.
         """
+
+    def controller(self, lab: Lab) -> Pilot:
+        """The last controller that it offers within the lab's time.
+
+        Raises
+        ------
+        BudgetSpent
+            There is none: the time is too short.
+        """
+        offered: list[Pilot] = []
+        why = "its time was enough for all that it does"
+        try:
+            offered.extend(self.offers(lab))
+        except BudgetSpent as error:
+            why = str(error)
+        if not offered:
+            raise BudgetSpent(f"{type(self).__name__} has no controller to offer: {why}")
+        return offered[-1]
