@@ -190,6 +190,19 @@ def test_a_cell_whose_worker_dies_is_flown_again_and_one_that_kills_them_ends_th
         run_comparison(script, "full", tmp_path / "all", Mortal(99))
 
 
+def test_when_nobody_takes_a_cell_any_more_what_was_done_is_stored(tmp_path):
+    class Gone(Here):
+        def submit(self, fn, /, *args, **kwargs):
+            if self.done == 3:
+                raise BrokenExecutor("its scheduler is gone")
+            return super().submit(fn, *args, **kwargs)
+
+    (script := tmp_path / "script.py").write_text(SCRIPT)
+    with pytest.raises(RunError, match=r"nobody takes more cells \(its scheduler is gone\); what was done is stored"):
+        run_comparison(script, "full", tmp_path / "out", Gone())
+    assert len(list(stored_cells(tmp_path / "out"))) == 3
+
+
 def test_what_is_not_installed_is_no_result_of_a_method():
     @dataclass(frozen=True)
     class Lacking(Method):

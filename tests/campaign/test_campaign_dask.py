@@ -10,6 +10,7 @@ import time
 import pytest
 from test_campaign_parallel import outcomes, script
 
+from socasadi.baselines import fly_cell, load_comparison, run_comparison
 from socasadi.campaign import RunError, dask_executor, load_study
 from socasadi.campaign.execution import _dask, _loop
 
@@ -53,6 +54,28 @@ def test_a_worker_lost_in_the_middle_loses_no_trial(script, tmp_path, cluster, e
     assert killed
     assert executor.jobs >= 1
     assert outcomes(result) == outcomes(study.run(tmp_path / "alone", progress=None))
+
+
+COMPARISON = """
+from socasadi import Circle, Cost, LinearMPC, Modal, Rod, SimulatedPlant, Study
+from socasadi.baselines import Comparison, Identified, Linearised
+
+study = Study(plant=SimulatedPlant(Rod.preset("paper"), noise=1e-3), mpc=LinearMPC(Modal()), task=Circle(duration=1.0))
+comparison = Comparison(
+    study, tasks={"circle": study.task}, methods={"a": Linearised(), "b": Identified(1.0)}, seeds=(0, 1),
+    checkpoints=(1,), flights=1,
+)
+"""
+
+
+def test_the_cells_of_a_comparison_come_out_as_in_this_process(tmp_path, executor):
+    (file := tmp_path / "comparison.py").write_text(COMPARISON)
+    cells = run_comparison(file, "full", tmp_path / "out", executor)
+    comparison = load_comparison(file)
+    assert len(cells) == 4
+    for cell in cells:
+        here = fly_cell(comparison, cell["task"], cell["method"], cell["seed"])
+        assert cell["points"][-1]["J"] == here["points"][-1]["J"]
 
 
 @pytest.mark.slow

@@ -12,6 +12,8 @@ from ._judge import Elsewhere
 Size = Literal["smoke", "quick", "full"]
 
 _SCHEMA = 1
+_NO_LIMIT = 1e8
+"""s of wall time for a flight: a slow method, or a busy machine, is no failure."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,7 @@ class Comparison:
     Parameters
     ----------
     study
-        Robot, MPC, cost and limits of time that all have in common. Its own task and seed are not used.
+        Robot, MPC and cost that all have in common. Its own task, seed and limit of wall time are not used.
     tasks
         By name: a task, or a study of its own where the robot is another.
     methods
@@ -106,10 +108,10 @@ class Comparison:
         return replace(self, tasks=kept, methods=flown, seeds=tuple(self.seeds)[:count], elsewhere_on=on)
 
     def of(self, task: str, seed: int) -> Study:
-        """The study of a task and a seed."""
+        """The study of a task and a seed, its flights without a limit of wall time."""
         given = self.tasks[task]
         study = given if isinstance(given, Study) else replace(self.study, task=given)
-        return replace(study, seed=int(seed))
+        return replace(study, seed=int(seed), time_limit=_NO_LIMIT)
 
     @property
     def cells(self) -> list[tuple[str, str, int]]:

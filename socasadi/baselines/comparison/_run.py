@@ -74,9 +74,14 @@ def run_comparison(
             missing.append(names)
     total, losses = len(comparison.cells), Counter()
     waiting: dict[Future, tuple[str, str, int]] = {}
+    gone: list[BrokenExecutor] = []
 
     def send(names: tuple[str, str, int]) -> None:
-        waiting[executor.submit(order_cell, str(script.resolve()), size, *names)] = names
+        if not gone:
+            try:
+                waiting[executor.submit(order_cell, str(script.resolve()), size, *names)] = names
+            except BrokenExecutor as error:
+                gone.append(error)
 
     try:
         for names in missing:
@@ -84,20 +89,21 @@ def run_comparison(
         while waiting:
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 names = waiting.pop(future)
+                name = ", ".join(map(str, names))
                 try:
                     cell = json.loads(future.result())
                 except BrokenExecutor as error:  # its worker died, of this cell or of something else
                     losses[names] += 1
                     if losses[names] > _LOSSES:
-                        raise RunError(f"{', '.join(map(str, names))}: its workers die ({error})") from error
+                        raise RunError(f"{name}: its workers die ({error})") from error
                     send(names)
                 except Exception as error:
-                    raise RunError(f"{', '.join(map(str, names))}: {error}") from error
+                    raise RunError(f"{name}: {error}") from error
                 else:
                     if cell["digest"] != comparison.digest(*names):
                         raise RunError(
-                            f"{', '.join(map(str, names))}: a worker knows another {script.name}, which was edited, or "
-                            "the worker is older: restart the workers, and give the command again"
+                            f"{name}: a worker knows another {script.name}, which was edited, or the worker is older: "
+                            "restart the workers, and give the command again"
                         )
                     store_cell(folder, cell)
                     cells.append(cell)
@@ -105,4 +111,6 @@ def run_comparison(
     finally:
         for future in waiting:
             future.cancel()
+    if gone:
+        raise RunError(f"nobody takes more cells ({gone[0]}); what was done is stored: give the command again")
     return cells
