@@ -58,12 +58,12 @@ def test_a_worker_lost_in_the_middle_loses_no_trial(script, tmp_path, cluster, e
 
 COMPARISON = """
 from socasadi import Circle, Cost, LinearMPC, Modal, Rod, SimulatedPlant, Study
-from socasadi.baselines import Comparison, Identified, Linearised
+from socasadi.baselines import PID, Comparison, Linearised
 
 study = Study(plant=SimulatedPlant(Rod.preset("paper"), noise=1e-3), mpc=LinearMPC(Modal()), task=Circle(duration=1.0))
 comparison = Comparison(
-    study, tasks={"circle": study.task}, methods={"a": Linearised(), "b": Identified(1.0)}, seeds=(0, 1),
-    checkpoints=(1,), flights=1,
+    study, tasks={"circle": study.task}, methods={"a": Linearised(), "b": PID(6.0)}, seeds=(0, 1),
+    checkpoints=(8,), flights=1,
 )
 """
 
@@ -75,6 +75,7 @@ def test_the_cells_of_a_comparison_come_out_as_in_this_process(tmp_path, executo
     assert len(cells) == 4
     for cell in cells:
         here = fly_cell(comparison, cell["task"], cell["method"], cell["seed"])
+        assert cell["broke"] is None
         assert cell["points"][-1]["J"] == here["points"][-1]["J"]
 
 
