@@ -186,7 +186,7 @@ def test_any_trial_can_be_watched_and_the_search_in_turn(browser):
     by_id(browser, "trial").send_keys("1")
     until(lambda: by_id(browser, "trial").get_attribute("value") == "1")
     by_id(browser, "onward").click()
-    browser.execute_script("document.getElementById('speed').value = '5'")
+    by_id(browser, "time").send_keys(selenium.Keys.END, *4 * [selenium.Keys.ARROW_LEFT])
     by_id(browser, "play").click()
     until(lambda: by_id(browser, "trial").get_attribute("value") == "2")
     by_id(browser, "play").click()
