@@ -46,6 +46,7 @@ pytestmark = pytest.mark.skipif(c_compiler() is None, reason="some methods are s
 def test_every_method_brings_a_controller_in_the_smoke_comparison(smoke):
     folder, only, done = smoke
     assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
     with (folder / "runs" / "compare-smoke" / "table.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len({row["method"] for row in rows}) >= 15

@@ -27,7 +27,9 @@ def comparison_figures(summary: Summary, comparison: Comparison, size: str) -> d
     size
         Which one it was, which each figure says.
     """
-    note = f"{size}: {len(comparison.seeds)} seeds, {len(comparison.tasks)} tasks, {comparison.flights} flights each"
+    counts = {"seed": len(comparison.seeds), "task": len(comparison.tasks), "flight": comparison.flights}
+    seeds, tasks, flights = (f"{count} {name}{'s' * (count != 1)}" for name, count in counts.items())
+    note = f"{size}: {seeds}, {tasks}, {flights} each"
     if size != "full":
         note += f"; less than the full comparison: up to {summary.checkpoints[-1]} episodes' worth of time"
     factor, unit = Units.of(comparison.study.plant).shown
@@ -70,7 +72,7 @@ def _grid(summary: Summary, note: str, row: float, below: float) -> tuple[Figure
 
 
 def _over_time(summary: Summary, comparison: Comparison, name: str, factor: float, label: str, note: str) -> Figure:
-    figure, axes = _grid(summary, note, 50, 24)
+    figure, axes = _grid(summary, note, 50, 12 + 5.2 * -(-len(summary.methods) // 5))
     for place, task in zip(axes, summary.tasks, strict=False):
         duration = comparison.of(task, 0).task.duration
         time = duration * np.array(summary.checkpoints)
@@ -87,7 +89,8 @@ def _over_time(summary: Summary, comparison: Comparison, name: str, factor: floa
         for method, rows in quartiles.items():
             there = np.isfinite(rows[:, 1])
             low, middle, high = np.minimum(rows[there], top).T
-            place.plot(time[there], middle, label=method, clip_on=False, **_look(summary, method))
+            # A line without a point that is not clipped would take up room at the figure's corner.
+            place.plot(time[there], middle, label=method, clip_on=not there.any(), **_look(summary, method))
             if method == summary.methods[0]:
                 place.fill_between(time[there], low, high, color=BLUE, alpha=0.2, lw=0)
             else:
@@ -97,7 +100,8 @@ def _over_time(summary: Summary, comparison: Comparison, name: str, factor: floa
             _plain_log(axis, parts)
     for place in axes[:: min(3, len(summary.tasks))]:
         place.set_ylabel(label)
-    figure.supxlabel("the robot's time / s", fontsize=8)
+    for place in axes[max(len(summary.tasks) - 3, 0) : len(summary.tasks)]:
+        place.set_xlabel("the robot's time / s")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5, handlelength=3.2)
     return figure
