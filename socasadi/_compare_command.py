@@ -45,8 +45,8 @@ def compare(
     comparison = load_comparison(script, size).of_parts(**parts)
     folder = folder or Path("runs") / f"{script.stem}-{size}"
     out.print(
-        f"{script}, {size}: {len(comparison.methods)} methods, {len(comparison.tasks)} tasks, {len(comparison.seeds)} "
-        f"seeds, up to {comparison.checkpoints[-1]} episodes each, into {folder}"
+        f"{script}, {size}: {comparison.extent}, {comparison.checkpoints[-1]} episodes' worth of the robot's time for "
+        f"each method, into {folder}"
     )
     began, first = time.monotonic(), [0]
 

@@ -89,10 +89,10 @@ def starting_from(study: Study, record: Path | None, anyway: bool) -> Study:
 
 
 def table(rows: Sequence[Mapping[str, str]], left: tuple[str, ...] = (), title: str = "") -> Table:
-    """A table without lines of texts by their heading, its columns at the right but for those ``left``."""
+    """A table without lines of texts by their heading, columns at the right but for those ``left``, not to be folded."""
     made = Table(box=None, header_style="bold", title=title or None, title_justify="left", title_style="")
     for heading in rows[0] if rows else ():
-        made.add_column(heading, justify="left" if heading in left else "right")
+        made.add_column(heading, justify="left" if heading in left else "right", no_wrap=heading in left)
     for row in rows:
         made.add_row(*row.values())
     return made

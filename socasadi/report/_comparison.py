@@ -27,9 +27,7 @@ def comparison_figures(summary: Summary, comparison: Comparison, size: str) -> d
     size
         Which one it was, which each figure says.
     """
-    counts = {"seed": len(comparison.seeds), "task": len(comparison.tasks), "flight": comparison.flights}
-    seeds, tasks, flights = (f"{count} {name}{'s' * (count != 1)}" for name, count in counts.items())
-    note = f"{size}: {seeds}, {tasks}, {flights} each"
+    note = f"{size}: {comparison.extent}"
     if size != "full":
         note += f"; less than the full comparison: up to {summary.checkpoints[-1]} episodes' worth of time"
     factor, unit = Units.of(comparison.study.plant).shown

@@ -297,7 +297,7 @@ def test_a_rival_is_beaten_task_by_task_and_by_a_rank_test():
 def test_the_table_has_a_row_for_each_task_and_method():
     summary = Summary.of(made_up({"ours": [[2.0, 4.0, np.inf]]}), ["task 0"], ["ours", "absent"])
     (row,) = summary_table(summary)
-    assert (row["J"], row["RMSE / mm"], row["failed"], row["open-loop / mm"]) == ("4", "1", "3 of 90", "-")
+    assert (row["J"], row["RMSE / mm"], row["failed"], row["open loop / mm"]) == ("4", "1", "3 of 90", "-")
 
 
 def test_other_robots_differ_in_what_they_say():

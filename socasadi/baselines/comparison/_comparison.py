@@ -114,6 +114,12 @@ class Comparison:
         return replace(study, seed=int(seed), time_limit=_NO_LIMIT)
 
     @property
+    def extent(self) -> str:
+        """How much is flown, in words."""
+        counts = {"method": len(self.methods), "task": len(self.tasks), "seed": len(self.seeds), "flight": self.flights}
+        return ", ".join(f"{count} {name}{'s' * (count != 1)}" for name, count in counts.items()) + " each"
+
+    @property
     def cells(self) -> list[tuple[str, str, int]]:
         """Task, method and seed of all that is flown, seed by seed."""
         return [(task, method, int(seed)) for seed in self.seeds for task in self.tasks for method in self.methods]

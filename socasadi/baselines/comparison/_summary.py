@@ -119,7 +119,7 @@ def summary_table(summary: Summary, checkpoint: int = -1) -> list[dict[str, str]
                     "p99 / us": steps[1],
                     "max / us": steps[2],
                     "failed": f"{sum(c['failed'] for c in cells)} of {sum(c['flights'] for c in cells)}",
-                    "open-loop / mm": _open_loop(cells),
+                    "open loop / mm": _open_loop(cells),
                 }
             )
     return rows
