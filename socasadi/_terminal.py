@@ -89,7 +89,7 @@ def starting_from(study: Study, record: Path | None, anyway: bool) -> Study:
 
 
 def table(rows: Sequence[Mapping[str, str]], left: tuple[str, ...] = (), title: str = "") -> Table:
-    """A table without lines of texts by their heading, columns at the right but for those ``left``, not to be folded."""
+    """A table without lines, texts by heading; columns at the right but for those ``left``, which are not folded."""
     made = Table(box=None, header_style="bold", title=title or None, title_justify="left", title_style="")
     for heading in rows[0] if rows else ():
         made.add_column(heading, justify="left" if heading in left else "right", no_wrap=heading in left)
