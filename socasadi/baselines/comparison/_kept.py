@@ -24,7 +24,6 @@ def stored_cells(folder: Path) -> Iterator[dict[str, Any]]:
 
 def store_cell(folder: Path, cell: dict[str, Any]) -> None:
     """Add a cell, in one write, so that two comparisons may share a folder."""
-    folder.mkdir(parents=True, exist_ok=True)
     with _file(folder).open("ab+") as file:
         line = json.dumps(cell).encode() + b"\n"
         if end := file.tell():

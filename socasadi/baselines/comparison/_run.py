@@ -64,6 +64,7 @@ def run_comparison(
         No worker can fly a cell, or they die of one; what was done is stored.
     """
     comparison = load_comparison(script, size).of_parts(tasks, methods, seeds)
+    folder.mkdir(parents=True, exist_ok=True)  # what cannot be kept is not worth flying
     known = {(c["task"], c["method"], c["seed"], c["digest"]): c for c in stored_cells(folder)}
     cells: list[dict[str, Any]] = []
     missing = []
