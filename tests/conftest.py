@@ -49,9 +49,13 @@ class ShortCircle(Circle):
     period: float = 2.0
 
 
-@pytest.fixture
-def toy_study():
+def make_toy_study():
     """A study of 12 trials of 20 samples that runs in a second or two."""
     return Study(
         plant=ToyPlant(), mpc=LinearMPC(Modal()), task=ShortCircle(), seed_points=6, iterations=6, verifications=1
     )
+
+
+@pytest.fixture
+def toy_study():
+    return make_toy_study()

@@ -31,7 +31,7 @@ compiled = pytest.mark.skipif(c_compiler() is None, reason="its program is solve
 
 
 FEW = {
-    "weights": (WeightSearch(probing=6.0), 1.2),
+    "weights": pytest.param(WeightSearch(probing=6.0), 1.2, marks=pytest.mark.slow),
     "weights on N4SID": (WeightSearch("subspace", probing=12.0), 1.1),
     "PID": (PID(probing=6.0), 4.0),
     "H-infinity": (HInfinity(probing=6.0), 4.0),

@@ -1,10 +1,13 @@
 """What the found theta is worth without the luck of its trial, and which one is exported."""
 
+import shutil
 from dataclasses import replace
 from math import inf
+from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import make_toy_study
 
 from socasadi.campaign import (
     Campaign,
@@ -21,9 +24,21 @@ from socasadi.plant import PlantFailure
 from socasadi.tune import Estimate
 
 
-def test_no_verification_is_flown_twice(toy_study, tmp_path):
-    result = toy_study.run(tmp_path / "run", progress=None)
-    first = assess(result)
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The folder of a run that was assessed, and what came of it."""
+    result = make_toy_study().run(tmp_path_factory.mktemp("whole") / "run", progress=None)
+    assert assessed(result) == {}
+    return result.folder, assess(result)
+
+
+def copied(whole, study, tmp_path):
+    folder, first = whole
+    return Result(study, Path(shutil.copytree(folder, tmp_path / "run"))), first
+
+
+def test_no_verification_is_flown_twice(whole, toy_study, tmp_path):
+    result, first = copied(whole, toy_study, tmp_path)
     steps = []
     original = type(toy_study.plant).step
     counted = replace(toy_study, plant=toy_study.plant)
@@ -33,9 +48,8 @@ def test_no_verification_is_flown_twice(toy_study, tmp_path):
     np.testing.assert_array_equal(first.verdicts["best"].J, second.verdicts["best"].J)
 
 
-def test_what_was_assessed_is_read_again_without_flying(toy_study, tmp_path):
-    result = toy_study.run(tmp_path / "run", progress=None)
-    assert assessed(result) == {}
+def test_what_was_assessed_is_read_again_without_flying(whole, toy_study, tmp_path):
+    result, _ = copied(whole, toy_study, tmp_path)
     worst = max(result.trials, key=lambda trial: trial.J or 0.0)
     rivals = {"rival": worst.theta, "stranger": 0.9 * result.best.theta}
     first = assess(result, rivals).verdicts
@@ -74,8 +88,8 @@ def test_a_plant_that_cannot_be_probed_still_has_its_best_theta_verified(toy_stu
     assert assessment.unidentified == "PlantFailure: the battery is empty"
 
 
-def test_the_identified_theta_predicts_no_worse_than_the_tuned_one(toy_study, tmp_path):
-    verdicts = assess(toy_study.run(tmp_path / "run", progress=None)).verdicts
+def test_the_identified_theta_predicts_no_worse_than_the_tuned_one(whole):
+    verdicts = whole[1].verdicts
     assert verdicts["identified"].prediction_error <= 1.05 * verdicts["best"].prediction_error
 
 

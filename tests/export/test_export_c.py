@@ -71,7 +71,14 @@ KINDS = {
 }
 
 
+@pytest.fixture
+def unoptimised(monkeypatch):
+    """The same arithmetic, compiled in half the time."""
+    monkeypatch.setenv("CFLAGS", "-O0")
+
+
 @with_compiler
+@pytest.mark.usefixtures("unoptimised")
 @pytest.mark.parametrize("real", ["double", "float"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_so_do_all_kinds_of_controllers_within_what_their_numbers_allow(tmp_path, kind, real):
@@ -82,6 +89,7 @@ def test_so_do_all_kinds_of_controllers_within_what_their_numbers_allow(tmp_path
 
 
 @with_compiler
+@pytest.mark.usefixtures("unoptimised")
 @pytest.mark.parametrize(("kind", "real"), [*((kind, "double") for kind in KINDS), ("pulling", "float")])
 def test_so_do_those_that_solve_by_osqp(tmp_path, kind, real):
     pytest.importorskip("osqp", reason="the package osqp is not installed")
@@ -92,6 +100,7 @@ def test_so_do_those_that_solve_by_osqp(tmp_path, kind, real):
 
 
 @with_compiler
+@pytest.mark.usefixtures("unoptimised")
 @pytest.mark.parametrize("mpc", [LinearMPC(Modal()), BUSY, TOLD, KINDS["unbounded outputs"]])
 def test_a_controller_of_a_given_model_is_exported_with_an_episode_on_that_model(tmp_path, mpc):
     system = mpc.model.state_space(THETA if mpc.model.inputs == 3 else FOUR, mpc.sample_time)
