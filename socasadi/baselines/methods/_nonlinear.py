@@ -1,5 +1,6 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import casadi as ca
@@ -67,18 +68,14 @@ class NonlinearMPC(Method):
         # The rod takes the place of the model, so that nothing but the settings is left open.
         searched = replace(lab.study.mpc, model=Fixed.of(linearised(lab), plant.sample_time), tuned=self.tuned)
         first = [self.doubt if name == "input_noise" else 1.0 for name in self.tuned]
-
-        def build(factors: np.ndarray) -> Pilot:
-            return _Controller(searched.at(factors), believed, advance, self)
-
-        return tuned(lab, searched.entries, build, initial=[first], most=self.trials)
+        build = partial(_Controller, plant=believed, advance=advance, method=self)
+        return tuned(lab, searched.entries, lambda x: build(searched.at(x)), initial=[first], most=self.trials)
 
 
 class _Controller(Law):
     def __init__(self, mpc: LinearMPC, plant: SimulatedPlant, advance: ca.Function, method: NonlinearMPC) -> None:
         super().__init__(mpc)
-        self._rod, self._method, self._rest = plant.rod, method, plant.sensor
-        self._advance = Buffered(advance)
+        self._rod, self._method, self._rest, self._advance = plant.rod, method, plant.sensor, Buffered(advance)
         self.begin()
 
     def begin(self) -> None:
