@@ -92,6 +92,11 @@ def test_within_the_rod_equations_follow_from_the_body_and_never_the_other_way()
         assert not any(module[:3] == ("socasadi", "rod", "mechanics") for module in modules(file)), file.name
 
 
+def test_a_method_to_compare_is_one_file_of_less_than_150_lines():
+    lengths = {file.name: len(file.read_text().splitlines()) for file in (PACKAGE / "baselines/methods").glob("*.py")}
+    assert max(lengths.values()) < 150, lengths
+
+
 @pytest.mark.parametrize(
     ("module", "slow"),
     [
