@@ -70,9 +70,10 @@ def compare(
         shown = [{k: v for k, v in row.items() if k not in ("task", "knows")} for row in rows if row["task"] == task]
         title = f"\n{task}, after {summary.checkpoints[-1]} episodes' worth of the robot's time:"
         out.print(table(shown, left=("method",), title=title))
+    files = [_written(rows, folder / "table.csv")]
     if rivals := _rivals(summary):
         out.print(table(rivals, left=("method", "knows"), title=f"\n{summary.methods[0]} against, in J:"))
-    files = [_written(rows, folder / "table.csv")]
+        files.append(_written(rivals, folder / "against.csv"))
     for task in comparison.elsewhere_on:
         if not (others := _elsewhere(summary, task)):
             continue  # no method had a controller to fly there

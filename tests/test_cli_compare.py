@@ -55,6 +55,9 @@ def test_every_method_brings_a_controller_in_the_smoke_comparison(smoke):
     assert {row["method"] for row in rows if row["J"] == "-"} <= {"for the worst"}
     assert all(float(row["J"]) < 60 for row in rows if row["J"] != "-")
     assert all(row["failed"].startswith("0 of") for row in rows)
+    with (folder / "runs" / "compare-smoke" / "against.csv").open() as file:
+        rivals = {row["method"] for row in csv.DictReader(file)}
+    assert rivals == {row["method"] for row in rows} - {"socasadi"}
     assert "[1/" in done.stdout
     assert "left" in done.stdout
 
