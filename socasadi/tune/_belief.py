@@ -29,6 +29,9 @@ from .surrogate import (
     transform_named,
 )
 
+FIRST_REPEAT = 20
+"""Trials after which the best told point is asked again, which shows how much noise there is."""
+
 # A value drawn at a told point is exact; so much of the variance keeps the matrix regular.
 _EXACT = 1e-6
 
@@ -146,7 +149,7 @@ class Believer:
 
         Reckons with what the trials leave open of the hyperparameters, of the noise above all: the fitted ones alone
         would be too sure. The trial that was observed as the best gives way only to one that is better under all of
-        them: while there are few trials, some hold all differences for noise.
+        them, and to none before a repeat could show any noise: of few trials they may hold all differences for noise.
         """
         data, rows = belief.data, belief.rows_that(keep)
         if noise_seen(belief.trials) is False:
@@ -164,6 +167,8 @@ class Believer:
         means = np.hstack(means)
         observed = data.targets[rows].argmin()
         surer = (means < means[observed]).all(axis=1)
+        if noise_seen(belief.trials) is None and len(belief.trials) <= FIRST_REPEAT:
+            surer[:] = False
         surer[observed] = True
         best = int(np.where(surer, means.mean(axis=1), np.inf).argmin())
         chances = _quantiles(means[best], np.array(deviations)[:, best], (0.05, 0.5, 0.95))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ._belief import Belief, noise_seen
+from ._belief import FIRST_REPEAT, Belief, noise_seen
 from ._search import Trial, keeps_limits
 from ._space import Space
 from .acquisition import Acquisition, Constraint, Merit, maximise
@@ -18,7 +18,6 @@ from .surrogate import Posterior
 _INCUMBENTS = 5
 _FANTASIES = 8
 _HIDDEN_WORLDS = 16
-_FIRST_REPEAT = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,4 +121,4 @@ def _likely(points: NDArray, constraints: Sequence[Constraint]) -> NDArray:
 
 def _is_time_to_repeat(told: int) -> bool:
     """Whether the best is asked again to see the noise: after 20, 40, 80, ... trials."""
-    return told >= _FIRST_REPEAT and told % _FIRST_REPEAT == 0 and (told // _FIRST_REPEAT).bit_count() == 1
+    return told >= FIRST_REPEAT and told % FIRST_REPEAT == 0 and (told // FIRST_REPEAT).bit_count() == 1

@@ -179,7 +179,7 @@ class Optimizer:
         """The told theta whose cost without noise is believed to be the lowest, and how sure that is.
 
         Of trials that kept all limits; None before there are two costs. The luckiest of many noisy costs is too good to
-        be true; this is not.
+        be true; this is not. Of up to twenty trials that show no noise it is the best observed.
         """
         if self.best is None or sum(trial.cost is not None for trial in self.trials) < 2:
             return None
