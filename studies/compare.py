@@ -6,7 +6,7 @@
     socasadi compare studies/compare.py --seeds 3     the same of three seeds, which are the first of the ten
 
 All methods are lent the same simulated arm for the same time, and their controllers are flown under noise that none has
-seen. The first method is the one that the others are compared with.
+seen. What predicts looks 20 samples ahead. The first method is the one that the others are compared with.
 """
 
 from dataclasses import replace
@@ -37,6 +37,7 @@ from socasadi.baselines import (
 )
 from socasadi.rod import Payload
 
+study = replace(circle, mpc=replace(circle.mpc, horizon=20))
 loaded = SimulatedPlant(replace(Rod.preset("paper"), payloads=Payload(0.1)), sample_time=0.05, noise=1e-3)
 stairs = ((0.02, 0.0), (0.04, 0.0), (0.06, 0.0), (0.03, 0.03))
 
@@ -44,14 +45,14 @@ stairs = ((0.02, 0.0), (0.04, 0.0), (0.06, 0.0), (0.03, 0.03))
 OTHERS = (Softer(young=0.8), Softer(young=1.2), Misrouted(1.2), Delayed(1))
 
 comparison = Comparison(
-    study=circle,
+    study=study,
     tasks={
         "circle": Circle(radius=0.05, period=20.0),
         "origin": Origin(tip=(-0.01, 0.04)),
         "eight": FigureEight(width=0.05, height=0.025, period=20.0),
         "stairs": SetPoints(points=stairs, hold=5.0),
         "80 mm": SetPoints(points=((0.08, 0.0),)),
-        "payload": replace(circle, plant=loaded),
+        "payload": replace(study, plant=loaded),
     },
     methods={
         "socasadi": WeightSearch("subspace", probing=40.0),

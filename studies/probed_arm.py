@@ -21,7 +21,7 @@ study = Study(
     mpc=LinearMPC(
         model,
         sample_time=plant.sample_time,
-        horizon=10,
+        horizon=20,
         Q=1e3,
         R=1.0,
         input_bounds=bounds,

@@ -36,7 +36,7 @@ FEW = {
     "PID": (PID(probing=6.0), 4.0),
     "H-infinity": (HInfinity(probing=6.0), 4.0),
     "N4SID": (Subspace(probing=12.0), 1.1),
-    "ILC": (IterativeLearning(probing=6.0), 1.1),
+    "ILC": (IterativeLearning(probing=8.0), 1.1),
     "Koopman": pytest.param(Koopman(probing=12.0), 3.0, marks=compiled),
     "DeePC": pytest.param(DeePC(probing=12.0), 2.0, marks=compiled),
     "velocity DeePC": pytest.param(DeePC(velocity=True, probing=12.0), 3.0, marks=compiled),

@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 from scipy.linalg import cho_factor, cho_solve
 
 from ...campaign import Pilot
-from ...model import StateSpace
+from ...model import StateSpace, subspace
 from ...mpc import Controller, ControllerInfo, weight_matrix
-from ..lab import Lab, Method, identified
+from ..lab import Lab, Method
 
 _BEFORE, _AFTER = 40, 200
 """Samples before and after a change of the reference in which the loop answers to it."""
@@ -20,7 +20,8 @@ class IterativeLearning(Method):
     r"""The same flight again and again, each with the reference shifted by what the errors of those before say.
 
     Norm-optimal iterative learning control (Bristow, Tharayil, Alleyne, "A survey of iterative learning control", IEEE
-    Control Systems Magazine 26(3), 2006) about the study's MPC on an identified model. The shift c (T, p) changes by
+    Control Systems Magazine 26(3), 2006) about the study's MPC on the model that N4SID finds in a probing record. The
+    shift c (T, p) changes by
 
     .. math:: \arg\min_\Delta\; |e - T_y \Delta|_Q^2 + |\Delta u + T_u \Delta|_R^2 + j \mu |\Delta|_Q^2,
 
@@ -35,11 +36,11 @@ class IterativeLearning(Method):
         mu.
     """
 
-    probing: float = 20.0
-    caution: float = 3.0
+    probing: float = 40.0
+    caution: float = 10.0
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
-        study, mpc, model = lab.study, lab.study.mpc, identified(lab, self.probing)
+        study, mpc, model = lab.study, lab.study.mpc, subspace(lab.probe(self.probing))
         controller = mpc.controller_for(model)
         yield controller
         count, p, m = study.task.samples(mpc.sample_time), mpc.outputs, mpc.inputs
