@@ -168,7 +168,12 @@ def test_a_start_that_was_killed_leaves_nothing_in_the_way(toy_study, tmp_path):
     """Whatever of the folder's first files is there: the study is begun, for nothing was asked."""
     whole = replace(toy_study, iterations=0).run(tmp_path / "whole", progress=None)
     for i, left in enumerate(
-        [(), ("lock",), ("lock", "journal.sqlite.new"), ("journal.sqlite.new-wal", "study.json.new")]
+        [
+            (),
+            ("lock",),
+            ("lock", "journal.sqlite.new", "journal.sqlite.new-journal"),
+            ("journal.sqlite.new-wal", "study.json.new"),
+        ]
     ):
         folder = tmp_path / f"run{i}"
         folder.mkdir()

@@ -63,7 +63,7 @@ def compare_settings(folder: Path, settings: dict[str, Any], may_differ: tuple[s
 def begun(folder: Path) -> bool:
     """Whether ``folder`` holds anything but what a start that was killed left behind."""
     left = {"lock", "study.json.new"}
-    left |= {f"journal.sqlite{new}{end}" for new in ("", ".new") for end in ("", "-wal", "-shm")}
+    left |= {f"journal.sqlite{new}{end}" for new in ("", ".new") for end in ("", "-wal", "-shm", "-journal")}
     return folder.is_dir() and not {file.name for file in folder.iterdir()} <= left
 
 
