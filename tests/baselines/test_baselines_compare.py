@@ -242,7 +242,7 @@ def test_some_of_its_parts_are_flown_by_themselves():
 @pytest.mark.parametrize(
     ("changes", "error", "fault"),
     [
-        ({"methods": {}}, ValueError, "at least one"),
+        ({"methods": {}}, TypeError, "at least one method"),
         ({"checkpoints": (3, 2)}, ValueError, "ascend"),
         ({"methods": {"x": Better}}, TypeError, "'x' is a Method"),
         ({"elsewhere_on": ("square",)}, ValueError, "'square'; the tasks are circle"),

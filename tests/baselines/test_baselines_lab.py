@@ -7,8 +7,19 @@ import numpy as np
 import pytest
 from baselines_support import SYSTEM, THETA, LinearPlant, study, watched
 
-from socasadi.baselines import BudgetSpent, Identified, Lab, Method, ModelSearch, static_gain, tuned
+from socasadi.baselines import (
+    BudgetSpent,
+    Forecast,
+    Identified,
+    Lab,
+    Method,
+    ModelSearch,
+    Program,
+    static_gain,
+    tuned,
+)
 from socasadi.campaign import Pilot
+from socasadi.codegen import c_compiler
 from socasadi.model import Entry
 
 
@@ -117,3 +128,43 @@ def test_a_method_of_ones_own_is_a_few_lines():
     assert Sleepy().information == "data sheet"
     with pytest.raises(TypeError, match="abstract"):
         replace(Method())
+
+
+@pytest.mark.skipif(c_compiler() is None, reason="the program is solved in C")
+@pytest.mark.parametrize("term", ["rate", "normalised", "literal"])
+def test_a_program_plans_with_all_that_the_mpc_weighs_and_bounds(term):
+    """On the model of the MPC itself it is the MPC: rates weighed and bounded, outputs against their soft bound."""
+    bounds = {"rate_bounds": (-16.0, 16.0), "output_bounds": (-0.012, 0.012)}
+    weights = {"rate_weight": 0.3, "slack_linear": 20.0, "slack_weight": 3e3, "R": 1e-4 if term == "literal" else 0.3}
+    made = study(LinearPlant(), terminal=None, horizon=8, input_term=term, **bounds, **weights)
+    mpc, N, scale = made.mpc, 8, 10.0
+    model = mpc.system(THETA)
+    pilot, plant = mpc.controller(THETA), LinearPlant()
+    response = [model.C @ np.linalg.matrix_power(model.A, k) for k in range(N + 1)]
+    by_input = np.zeros((2 * N, 3 * N))
+    for k in range(N):
+        for j in range(k + 1):
+            seen = response[k - j] @ model.B + (model.D if j == k else 0)
+            by_input[2 * k : 2 * k + 2, 3 * j : 3 * j + 3] = scale * seen
+    order = len(model.A)
+    pick = np.split(np.eye(order + 2 * N + 3), [order, order + 2 * N])
+    forecast = Forecast(
+        input=(np.eye(3 * N), np.zeros((3 * N, order + 2 * N + 3))),
+        output=(by_input, np.vstack(response[1:]) @ pick[0]),
+        reference=pick[1],
+        before=pick[2],
+    )
+    program = Program(mpc, forecast)
+    y, at_bound, beyond = plant.reset(), 0, 0
+    pilot.reset(0.0)
+    before = np.zeros(3)
+    for t in range(40):
+        wanted = 0.015 * np.stack([np.sin(0.3 * (t + np.arange(N))), np.cos(0.3 * (t + np.arange(N)))], axis=1)
+        u = pilot.step(y, wanted)
+        plan = program.inputs(np.concatenate([plant.x, wanted.ravel(), before / scale]), pilot.info)
+        np.testing.assert_allclose(plan[0], u, atol=5e-3)
+        at_bound += np.isclose(np.abs(u - before), 0.8).any()
+        y, before = plant.step(u), u
+        beyond += np.abs(y).max() > 0.0119
+    assert at_bound > 2
+    assert beyond > 2

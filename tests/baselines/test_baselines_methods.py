@@ -33,10 +33,10 @@ compiled = pytest.mark.skipif(c_compiler() is None, reason="its program is solve
 FEW = {
     "weights": pytest.param(WeightSearch(probing=6.0), 1.2, marks=pytest.mark.slow),
     "weights on N4SID": (WeightSearch("subspace", probing=12.0), 1.1),
-    "PID": (PID(probing=6.0), 4.0),
-    "H-infinity": (HInfinity(probing=6.0), 4.0),
+    "PID": (PID(), 4.0),
+    "H-infinity": (HInfinity(probing=8.0), 4.0),
     "N4SID": (Subspace(probing=12.0), 1.1),
-    "ILC": (IterativeLearning(probing=8.0), 1.1),
+    "ILC": (IterativeLearning(WeightSearch("subspace", probing=8.0, most=3), flights=1), 1.1),
     "Koopman": pytest.param(Koopman(probing=12.0), 3.0, marks=compiled),
     "DeePC": pytest.param(DeePC(probing=12.0), 2.0, marks=compiled),
     "velocity DeePC": pytest.param(DeePC(velocity=True, probing=12.0), 3.0, marks=compiled),
@@ -44,11 +44,11 @@ FEW = {
 
 
 @pytest.mark.parametrize(("method", "times"), FEW.values(), ids=FEW)
-def test_a_minute_with_the_arm_gives_a_controller_that_follows_the_circle(method, times):
+def test_a_hundred_seconds_with_the_arm_give_a_controller_that_follows_the_circle(method, times):
     """J within a factor of that of the MPC on the arm's own linearisation; not to move costs 300 times as much."""
     made = rod_study()
-    (best,) = Linearised().offers(Lab(made, (60.0,)))
-    pilot = method.controller(Lab(made, (60.0,)))
+    (best,) = Linearised().offers(Lab(made, (100.0,)))
+    pilot = method.controller(Lab(made, (100.0,)))
     flown, path = worth(made, pilot, 1)
     assert flown.J[0] < times * worth(made, best, 1)[0].J[0]
     assert flown.failed == flown.fallbacks == 0
@@ -113,16 +113,8 @@ def test_without_noise_and_regularisation_deepc_is_the_mpc_on_the_true_model(eff
 
 @compiled
 def test_a_lifting_without_monomials_predicts_a_linear_robot_exactly():
-    made = study()
-    pilot = _koopman._Controller(Koopman(degree=1), made.mpc, probe(LinearPlant(), (-10, 10)), 2, 1e-12, 1.0, 1.0)
-    plant, errors = LinearPlant(), []
-    y = plant.reset()
-    pilot.reset(0.0)
-    for t in range(40):
-        u = pilot.step(y, np.tile([0.02 * np.sin(0.2 * t), 0.01], (10, 1)))
-        y = plant.step(u)
-        errors.append(np.abs(pilot._expected - y).max())
-    assert max(errors[3:]) < 1e-6
+    pilot = _koopman._Controller(Koopman(degree=1), study().mpc, probe(LinearPlant(), (-10, 10)), 2, 1e-12, 1.0, 1.0)
+    assert pilot.prediction_error(probe(LinearPlant(), (-10, 10), seed=1)) < 1e-6
 
 
 def test_n4sid_finds_the_response_of_the_robot():
@@ -137,7 +129,7 @@ def test_learning_from_flight_to_flight_lowers_the_cost_where_nothing_else_chang
     made = study(LinearPlant(), preview=1)
     lab = Lab(made, (120.0,))
     costs = watched(lab)
-    IterativeLearning(probing=10.0, caution=0.1).controller(lab)
+    IterativeLearning(WeightSearch("subspace", probing=10.0, most=1), flights=1, caution=0.3).controller(lab)
     assert np.all(np.diff(costs[:8]) < 1e-3 * costs[0])
     assert costs[7] < 0.9 * costs[0]
 

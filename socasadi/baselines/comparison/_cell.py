@@ -1,3 +1,4 @@
+import importlib.metadata
 import time
 from dataclasses import asdict
 from typing import Any
@@ -5,6 +6,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from ...mpc import LinearMPC
 from ..lab import BudgetSpent, Lab
 from ._comparison import Comparison
 from ._judge import open_loop_error, worth, worth_elsewhere
@@ -22,9 +24,11 @@ def fly_cell(comparison: Comparison, task: str, method: str, seed: int) -> dict[
 def _flown(comparison: Comparison, task: str, method: str, seed: int) -> dict[str, Any]:
     study, began = comparison.of(task, seed), time.perf_counter()
     seconds = [at * study.task.duration for at in comparison.checkpoints]
-    lab, offers, broke = Lab(study, seconds), {}, None
+    lab, offers, broke = Lab(study, seconds, known=comparison.study.plant), {}, None
     try:
         for pilot in comparison.methods[method].offers(lab):
+            if not isinstance(getattr(pilot, "mpc", None), LinearMPC):
+                raise TypeError(f"offers yields controllers, which have an mpc; not {pilot!r}")
             offers |= {at: (pilot, lab.spent) for at in seconds if at >= lab.spent - 1e-9}
     except BudgetSpent:
         pass
@@ -66,6 +70,7 @@ def _flown(comparison: Comparison, task: str, method: str, seed: int) -> dict[st
         "spent": lab.spent,
         "broke": broke,
         "wall": time.perf_counter() - began,
+        "version": importlib.metadata.version("socasadi"),
     }
     return _finite(cell)
 

@@ -7,11 +7,14 @@ from typing import Literal, get_args
 from ...campaign import Study, Task
 from ...campaign.store import describe
 from ..lab import Method
+from ._check import check_comparison
 from ._judge import Elsewhere
+from ._own import own_code
 
 Size = Literal["smoke", "quick", "full"]
 
-_SCHEMA = 1
+_SCHEMA = 2
+"""Raised when what a cell holds is reckoned in another way, or what every method is given: all are flown again."""
 _NO_LIMIT = 1e8
 """s of wall time for a flight: a slow method, or a busy machine, is no failure."""
 
@@ -25,7 +28,8 @@ class Comparison:
     study
         Robot, MPC and cost that all have in common. Its own task, seed and limit of wall time are not used.
     tasks
-        By name: a task, or a study of its own where the robot is another.
+        By name: a task, or a study of its own where the robot is another. Methods that take the plant's model are given
+        that of ``study`` all the same: they do not know what is different.
     methods
         By name.
     seeds
@@ -42,7 +46,9 @@ class Comparison:
     Raises
     ------
     ValueError
-        Nothing is compared, or the checkpoints do not ascend.
+        Nothing is compared, or a setting is out of its range; the message names it and its value.
+    TypeError
+        A part is of another type.
     """
 
     study: Study
@@ -55,15 +61,7 @@ class Comparison:
     elsewhere_on: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        if not (self.tasks and self.methods and len(self.seeds) and len(self.checkpoints)):
-            raise ValueError("a comparison takes at least one task, method, seed and checkpoint")
-        if list(self.checkpoints) != sorted(set(self.checkpoints)) or self.checkpoints[0] < 1:
-            raise ValueError(f"checkpoints are numbers of episodes that ascend, not {list(self.checkpoints)}")
-        for name, method in self.methods.items():
-            if not isinstance(method, Method):
-                raise TypeError(f"the method {name!r} is a Method, not {method!r}")
-        if unknown := sorted(set(self.elsewhere_on) - set(self.tasks)):
-            raise ValueError(f"elsewhere_on names {unknown[0]!r}; the tasks are {', '.join(self.tasks)}")
+        check_comparison(self)
 
     def of_size(self, size: Size) -> "Comparison":
         """The comparison as it is (``"full"``), or less of it.
@@ -130,9 +128,12 @@ class Comparison:
             "schema": _SCHEMA,
             "study": self.of(task, seed).settings,
             "method": describe(self.methods[method]),
+            "own code": [own_code(part) for part in (self.methods[method], self.of(task, seed).task)],
             "checkpoints": list(self.checkpoints),
             "flights": self.flights,
-            "elsewhere": describe(dict(self.elsewhere)) if task in self.elsewhere_on else None,
+            "elsewhere": [(name, describe(other), own_code(other)) for name, other in self.elsewhere.items()]
+            if task in self.elsewhere_on
+            else None,
         }
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
 

@@ -3,14 +3,16 @@
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...campaign import Pilot, Study, fly_once, probe
-from ...model import StateSpace, state_space_error
+from ...model import state_space_error
 from ...mpc import Controller, ControllerInfo, LinearMPC
 from ...plant import Plant
+from ..lab import believed
 
 _VERIFICATION = 1
 """Stream of random numbers: that of a campaign's verification."""
@@ -37,6 +39,8 @@ class Worth:
         Wall time of a step of the controller, from Python: median, 99 % quantile and longest, s.
     fallbacks
         Samples without an answer of the controller's own, over all flights.
+    failure
+        Why the first of those that failed did; None if none did.
     """
 
     J: tuple[float, ...]
@@ -46,6 +50,7 @@ class Worth:
     effort: float
     solve: tuple[float, float, float]
     fallbacks: int
+    failure: str | None = None
 
     @property
     def failed(self) -> int:
@@ -57,11 +62,13 @@ def worth(study: Study, pilot: Pilot, flights: int) -> tuple[Worth, np.ndarray]:
     """What ``pilot`` is worth in so many flights, and the true outputs (T + 1, p) of the first."""
     timed = _Timed(pilot)
     J, rmse, told, fallbacks, path = [], [], [], 0, np.zeros((0, study.mpc.outputs))
+    failure = None
     for i in range(1, flights + 1):
         episode = fly_once(study, timed, stream=(_VERIFICATION, i))
         fallbacks += episode.fallbacks
         if i == 1:
             path = episode.truth
+        failure = failure or episode.failure
         whole = episode.failure is None and np.isfinite(episode.output).all()
         score = study.cost.score(episode, study.mpc.input_scale) if whole else None
         J.append(score.J if score else np.inf)
@@ -76,26 +83,28 @@ def worth(study: Study, pilot: Pilot, flights: int) -> tuple[Worth, np.ndarray]:
     settled, violated, effort = np.median(told, axis=0).tolist() if told else (np.inf, np.nan, np.nan)
     steps = np.array(timed.seconds or [np.nan])
     solve = (float(np.median(steps)), float(np.quantile(steps, 0.99)), float(steps.max()))
-    return Worth(tuple(J), tuple(rmse), settled, violated, effort, solve, fallbacks), path
+    return Worth(tuple(J), tuple(rmse), settled, violated, effort, solve, fallbacks, failure), path
 
 
 def open_loop_error(study: Study, pilot: Pilot) -> float:
     """How far the prediction model in a controller is off on a probing record that no method has seen, m.
 
-    Root mean square distance over the record, without any correction; NaN of a controller without a linear model, and
-    where the robot does not bear to be probed.
+    Root mean square distance over the record, without any correction; NaN of a controller without a model, and where
+    the robot does not bear to be probed. A pilot that is no :class:`Controller` says it itself, by a method
+    ``prediction_error(record)``.
     """
-    if not isinstance(pilot, Controller) or pilot.mpc.delay or pilot.mpc.measured_disturbances:
+    if isinstance(pilot, Controller):
+        if pilot.mpc.delay or pilot.mpc.measured_disturbances:
+            return np.nan
+        error = partial(state_space_error, believed(pilot))
+    elif (error := getattr(pilot, "prediction_error", None)) is None:
         return np.nan
-    design, scale = pilot.design, pilot.mpc.input_scale
-    n = design.order - design.outputs  # without the disturbances behind the model's own states
-    model = StateSpace(design.A[:n, :n], design.B[:n] / scale, design.C[:, :n], design.D / scale)
     seed = int(np.random.SeedSequence([study.seed, _VERIFICATION, 0]).generate_state(1)[0])
     try:
         record = probe(study.plant, study.mpc.input_bounds, seed=seed)
     except Exception:  # whatever a plant raises
         return np.nan
-    return state_space_error(model, record)
+    return error(record)
 
 
 def worth_elsewhere(study: Study, pilot: Pilot, flights: int, others: Elsewhere) -> dict[str, Worth]:

@@ -87,6 +87,7 @@ class DeadCable:
     cable: int = 0
 
     def __call__(self, plant: Plant) -> Plant:
+        _check_cable(self.cable, plant.inputs)
         return _Between(plant, cut=self.cable)
 
 
@@ -97,6 +98,8 @@ class Delayed:
     samples: int = 1
 
     def __call__(self, plant: Plant) -> Plant:
+        if self.samples < 0:
+            raise ValueError(f"inputs act 0 samples late or more, not {self.samples}")
         return _Between(plant, late=self.samples)
 
 
@@ -142,6 +145,11 @@ class _Between:
         return self.plant.step(given) if tip_force is None else self.plant.step(given, tip_force=tip_force)
 
 
+def _check_cable(index: int, cables: int) -> None:
+    if not 0 <= index < cables:
+        raise ValueError(f"there is no cable {index}; the robot's are 0 to {cables - 1}")
+
+
 def _simulated(plant: Plant) -> SimulatedPlant:
     if not isinstance(plant, SimulatedPlant):
         raise TypeError(f"only a simulated rod can be changed, not {type(plant).__name__}")
@@ -154,4 +162,5 @@ def _another_rod(plant: Plant, change: Callable[[Rod], Rod]) -> SimulatedPlant:
 
 
 def _with(cables: tuple[Any, ...], index: int, change: Callable[[Any], Any]) -> tuple[Any, ...]:
+    _check_cable(index, len(cables))
     return tuple(change(cable) if i == index else cable for i, cable in enumerate(cables))

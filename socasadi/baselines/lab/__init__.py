@@ -3,7 +3,7 @@
 from ._lab import BudgetSpent, Lab
 from ._law import Forecast, Law, Program, looked_ahead
 from ._method import Information, Method
-from ._models import identified, static_gain
+from ._models import believed, identified, static_gain
 from ._tuned import tuned
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "Law",
     "Method",
     "Program",
+    "believed",
     "identified",
     "looked_ahead",
     "static_gain",

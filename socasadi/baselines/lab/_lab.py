@@ -28,6 +28,8 @@ class Lab:
         Robot, task, cost, and the MPC's bounds and sample time.
     checkpoints
         s of the robot's time at which a method is asked for its controller, ascending; the last is all there is.
+    known
+        The plant whose model is at hand, for methods that take one: the study's, or one that is not quite like it.
 
     Attributes
     ----------
@@ -35,10 +37,17 @@ class Lab:
         s of the robot's time so far.
     flights, probes, failed
         Experiments so far: of controllers, without one, and those of the former that failed.
+
+    Raises
+    ------
+    ValueError
+        There is no checkpoint, or they do not ascend from more than 0 s.
     """
 
-    def __init__(self, study: Study, checkpoints: Sequence[float]) -> None:
-        self.study, self.checkpoints = study, tuple(checkpoints)
+    def __init__(self, study: Study, checkpoints: Sequence[float], known: Plant | None = None) -> None:
+        self.study, self.checkpoints, self.known = study, tuple(checkpoints), study.plant if known is None else known
+        if not self.checkpoints or list(self.checkpoints) != sorted({*self.checkpoints}) or self.checkpoints[0] <= 0:
+            raise ValueError(f"checkpoints are seconds that ascend from more than 0, not {list(checkpoints)}")
         self.spent = 0.0
         self.flights = self.probes = self.failed = 0
 

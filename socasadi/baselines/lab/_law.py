@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...model import Record
 from ...mpc import KKT_TOLERANCE, ActiveSet, ControllerInfo, LinearMPC, weight_matrix
 from ...mpc.formulation import dual_program
 
@@ -46,6 +47,15 @@ class Law(ABC):
         self.held = np.clip(wanted, *self.mpc.input_limits)
         return self.held.copy()
 
+    def prediction_error(self, record: Record) -> float:
+        """How far its model, if it has one, is off on a record from rest: root mean square distance, m."""
+        predicted = self.predicted(record.tension)
+        return float(np.sqrt(np.mean(np.sum((record.output[1:] - predicted) ** 2, axis=1))))
+
+    def predicted(self, tension: np.ndarray) -> np.ndarray:
+        """Outputs (T, p), m, at the ends of samples with inputs (T, m), N, from rest; NaN without a model."""
+        return np.full((len(tension), self.mpc.outputs), np.nan)
+
     @abstractmethod
     def begin(self) -> None:
         """Start anew, at rest under ``held``."""
@@ -83,42 +93,53 @@ class Forecast:
 class Program:
     r"""The program of a predictive controller that has no linear model of its own, or another one:
 
-    .. math:: \min_z\; \sum_{k=1}^{N} |y_k - r_k|_Q^2 + \rho_R(u) + \lambda |s|^2 + z'Hz/2 + (g p)'z
+    .. math:: \min_z\; \sum_{k=1}^{N} |y_k - r_k|_Q^2 + \rho_R(u) + |\Delta u / u_{max}|_{R_\Delta}^2
+        + \lambda |s|^2 + \mu |s|_1 + z'Hz/2 + (g p)'z
 
-    within the bounds of an MPC, whose weights these are, R multiplied by ``effort``; bounds of outputs are soft. It is
-    solved by the project's own solver in C.
+    within the bounds and rate bounds of an MPC, whose weights these are, R multiplied by ``effort``; bounds of outputs
+    are soft. It is solved by the project's own solver in C.
     """
 
     def __init__(self, mpc: LinearMPC, forecast: Forecast, effort: float = 1.0) -> None:
         (Au, Bu), (Ay, By), m = forecast.input, forecast.output, mpc.inputs
         horizon = len(Au) // m
-        R, Q = effort * weight_matrix(mpc.R, m, "R"), weight_matrix(mpc.Q, mpc.outputs, "Q")
-        weighed, offset = np.eye(len(Au)), np.zeros((len(Au), len(forecast.before[0])))
-        if mpc.input_term == "rate":
-            weighed = weighed - np.eye(len(Au), k=-m)
-            offset[:m] = -forecast.before
-        elif mpc.input_term == "literal":
-            R = R * np.outer(mpc.input_scale, mpc.input_scale)
-        Q, R = np.kron(np.eye(horizon), Q), np.kron(np.eye(horizon), R)
-        moved, known = weighed @ Au, weighed @ Bu + offset
-        hessian = 2 * (Ay.T @ Q @ Ay + moved.T @ R @ moved)
-        gradient = 2 * (Ay.T @ Q @ (By - forecast.reference) + moved.T @ R @ known)
+        each = np.eye(horizon)
+        R, Q = effort * weight_matrix(mpc.R, m, "R"), np.kron(each, weight_matrix(mpc.Q, mpc.outputs, "Q"))
+        between = np.eye(len(Au)) - np.eye(len(Au), k=-m)
+        Am, Bm = between @ Au, between @ Bu  # changes from sample to sample
+        Bm[:m] -= forecast.before
+        hessian, gradient = 2 * Ay.T @ Q @ Ay, 2 * Ay.T @ Q @ (By - forecast.reference)
+        terms = [(R, Am, Bm)] if mpc.input_term == "rate" else [(R, Au, Bu)]
+        if mpc.input_term == "literal":
+            terms = [(R * np.outer(mpc.input_scale, mpc.input_scale), Au, Bu)]
+        if np.any(mpc.rate_weight):
+            terms.append((weight_matrix(mpc.rate_weight, m, "rate_weight"), Am, Bm))
+        for weight, free_part, known_part in terms:
+            weighed = 2 * free_part.T @ np.kron(each, weight)
+            hessian, gradient = hessian + weighed @ free_part, gradient + weighed @ known_part
         if forecast.own is not None:
             hessian, gradient = hessian + forecast.own[0], gradient + forecast.own[1]
         rows, free = [Au], [Bu]
         lower, upper = ([np.tile(side / mpc.input_scale, horizon)] for side in mpc.input_limits)
-        quadratic = [np.full(len(Au), np.inf)]
+        quadratic, linear = [np.full(len(Au), np.inf)], [np.zeros(len(Au))]
+        if mpc.rate_limits is not None:
+            rows.append(Am)
+            free.append(Bm)
+            for sides, side in zip((lower, upper), mpc.rate_limits, strict=True):
+                sides.append(np.tile(side * mpc.sample_time / mpc.input_scale, horizon))
+            quadratic.append(np.full(len(Am), np.inf))
+            linear.append(np.zeros(len(Am)))
         if mpc.output_limits is not None:
             unit = mpc.largest_output_bound
             rows.append(Ay / unit)
             free.append(By / unit)
             lower.append(np.tile(mpc.output_limits[0] / unit, horizon))
             upper.append(np.tile(mpc.output_limits[1] / unit, horizon))
-            slack = np.broadcast_to(np.asarray(mpc.slack_weight, dtype=float), mpc.outputs)
-            quadratic.append(np.tile(2 * slack * unit**2, horizon))
-        a, b, least, most, softness = (*map(np.vstack, (rows, free)), *map(np.concatenate, (lower, upper, quadratic)))
+            for prices, price in ((quadratic, 2 * np.asarray(mpc.slack_weight) * unit), (linear, mpc.slack_linear)):
+                prices.append(np.tile(np.broadcast_to(np.asarray(price) * unit, mpc.outputs), horizon))
+        stacked = (*map(np.vstack, (rows, free)), *map(np.concatenate, (lower, upper, quadratic, linear)))
         self._scale, self._shape = mpc.input_scale, (horizon, m)
-        self._solver = ActiveSet(dual_program(hessian, gradient, a, b, least, most, softness, np.zeros(len(a))))
+        self._solver = ActiveSet(dual_program(hessian, gradient, *stacked))
 
     def forget(self) -> None:
         """Start the next solution from nothing."""

@@ -6,7 +6,7 @@ from typing import Literal
 from ...campaign import Pilot
 from ._lab import BudgetSpent, Lab
 
-Information = Literal["data sheet", "plant model"]
+Information = Literal["data sheet", "other robots", "plant model"]
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,10 @@ class Method(ABC):
 
     @property
     def information(self) -> Information:
-        """What it is told beforehand: ``"plant model"`` if it reads the true robot's parameters."""
+        """What it is lent or told beside the robot and its data sheet.
+
+        ``"other robots"`` if it flies on some, ``"plant model"`` if it reads the parameters of :attr:`Lab.known`.
+        """
         return "data sheet"
 
     @abstractmethod

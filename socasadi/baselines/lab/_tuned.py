@@ -64,6 +64,11 @@ def tuned(
         What counts of the several J.
     most
         Trials after which the best so far is left as it is, though there be time.
+
+    Raises
+    ------
+    BudgetSpent
+        The lab's time is over before the search is.
     """
     study, search, in_vain = lab.study, search_for(kind, Space(knobs), lab.study, initial), 0
     plants = [None, *(other(study.plant) for other in over)]
@@ -79,8 +84,10 @@ def tuned(
         give_up = None if best is None or study.give_up is None else study.give_up * best
         in_vain = 0
         _tell(search, theta, _flown(lab, pilot, plants, by, give_up, number))
-        if (lab.due(len(plants)) or number >= most) and (chosen := search.best_estimated or search.best) is not None:
+        if lab.due(len(plants)) and (chosen := search.best_estimated or search.best) is not None:
             yield build(chosen.theta)
+    if (chosen := search.best_estimated or search.best) is not None:
+        yield build(chosen.theta)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ class Identified(Method):
         s of probing.
     """
 
-    probing: float = 20.0
+    probing: float = 40.0
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         yield lab.study.mpc.controller_for(identified(lab, self.probing))
@@ -43,7 +43,7 @@ class Subspace(Method):
 
 @dataclass(frozen=True)
 class Linearised(Method):
-    """The study's MPC on the linearisation of the rod itself about rest."""
+    """The study's MPC on the linearisation about rest of the rod that is known."""
 
     @property
     def information(self) -> Information:
@@ -53,16 +53,21 @@ class Linearised(Method):
         yield lab.study.mpc.controller_for(linearised(lab))
 
 
-def linearised(lab: Lab) -> StateSpace:
-    """The rod about rest, sampled.
+def known_rod(lab: Lab) -> SimulatedPlant:
+    """The plant that is known.
 
     Raises
     ------
     TypeError
-        The plant is no simulated rod.
+        It is no simulated rod.
     """
-    plant = lab.study.plant
-    if not isinstance(plant, SimulatedPlant):
-        raise TypeError(f"only a simulated rod can be linearised, not {type(plant).__name__}")
+    if not isinstance(lab.known, SimulatedPlant):
+        raise TypeError(f"only a simulated rod has a model to take, not {type(lab.known).__name__}")
+    return lab.known
+
+
+def linearised(lab: Lab) -> StateSpace:
+    """The rod that is known, about rest, sampled."""
+    plant = known_rod(lab)
     rest = plant.rod.resting(lab.study.mpc.input_bounds)
     return StateSpace(*plant.rod.linearise(rest, plant.sample_time, plant.sensor))

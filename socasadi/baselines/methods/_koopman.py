@@ -88,24 +88,29 @@ class _Controller(Law):
         self._program.forget()
         self._u = np.tile(self.held / self.mpc.input_scale, (self._delays, 1))
         self._y: np.ndarray | None = None
-        self._disturbance, self._expected = np.zeros(self.mpc.outputs), None
+        self._disturbance, self._lifted = np.zeros(self.mpc.outputs), None
 
     def act(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
         before = self.held / self.mpc.input_scale
-        if self._y is None or self._expected is None:  # it was at rest so far
+        if self._y is None or self._lifted is None:  # it was at rest so far
             self._y = np.tile(y, (self._delays + 1, 1))
         else:
             self._y = np.vstack([y, self._y[:-1]])
             self._u = np.vstack([before, self._u[:-1]])
-            self._disturbance = self._disturbance + self._gain * (y - self._expected - self._disturbance)
-        lifted = self._lift(self._y, self._u)
+            expected = self._unit * (self._A @ self._lifted + self._B @ before)[: len(y)]
+            self._disturbance = self._disturbance + self._gain * (y - expected - self._disturbance)
+        self._lifted = lifted = self._lift(self._y, self._u)
         ahead = looked_ahead(reference, self._method.horizon)
         parameters = np.concatenate([lifted, self._disturbance, ahead, before], axis=None)
-        wanted = self._program.inputs(parameters, self.info)[0]
-        lower, upper = self.mpc.input_limits
-        share = np.clip(np.nan_to_num(wanted, nan=0.0), lower, upper) / self.mpc.input_scale
-        self._expected = self._unit * (self._A @ lifted + self._B @ share)[: len(y)]
-        return wanted
+        return self._program.inputs(parameters, self.info)[0]
+
+    def predicted(self, tension: np.ndarray) -> np.ndarray:
+        y, u = np.zeros((self._delays + 1, self.mpc.outputs)), np.zeros((self._delays, self.mpc.inputs))
+        lifted, outputs = self._lift(y, u), []
+        for share in tension / self.mpc.input_scale:
+            lifted = self._A @ lifted + self._B @ share
+            outputs.append(self._unit * lifted[: self.mpc.outputs])
+        return np.array(outputs)
 
     def _lift(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Newest first: outputs (delays + 1, p), m, and inputs (delays, m), as shares -> the lifted state."""

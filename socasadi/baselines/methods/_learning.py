@@ -1,15 +1,15 @@
-import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cho_factor, cho_solve
 
 from ...campaign import Pilot
-from ...model import StateSpace, subspace
+from ...model import Record, StateSpace, state_space_error
 from ...mpc import Controller, ControllerInfo, weight_matrix
-from ..lab import Lab, Method
+from ..lab import Lab, Method, believed
+from ._weights import WeightSearch
 
 _BEFORE, _AFTER = 40, 200
 """Samples before and after a change of the reference in which the loop answers to it."""
@@ -17,34 +17,40 @@ _BEFORE, _AFTER = 40, 200
 
 @dataclass(frozen=True)
 class IterativeLearning(Method):
-    r"""The same flight again and again, each with the reference shifted by what the errors of those before say.
+    r"""The same flight again and again, with the reference shifted by what the errors of those before say.
 
     Norm-optimal iterative learning control (Bristow, Tharayil, Alleyne, "A survey of iterative learning control", IEEE
-    Control Systems Magazine 26(3), 2006) about the study's MPC on the model that N4SID finds in a probing record. The
-    shift c (T, p) changes by
+    Control Systems Magazine 26(3), 2006) about a tuned MPC. The shift c (T, p) changes by
 
-    .. math:: \arg\min_\Delta\; |e - T_y \Delta|_Q^2 + |\Delta u + T_u \Delta|_R^2 + j \mu |\Delta|_Q^2,
+    .. math:: \arg\min_\Delta\; |e - T_y \Delta|_Q^2 + |\Delta u + T_u \Delta|_R^2 + \mu |\Delta|_Q^2,
 
-    where e and :math:`\Delta u` are the errors and changes of inputs of the last flight, the j-th, and T says how the
-    loop answers to a shift, by the identified model. What is learned is good for this one task alone.
+    where e and :math:`\Delta u` are errors and changes of inputs, means over some flights with the best shift so far,
+    and T says how the loop answers to a shift, by the MPC's model. Where that does not lower the mean J, mu is made
+    larger and the step shorter. What is learned is good for this one task alone.
 
     Parameters
     ----------
-    probing
-        s of probing.
+    base
+        Where the MPC comes from; nothing is learned before it is through.
+    flights
+        With each shift.
     caution
-        mu.
+        mu at first.
     """
 
-    probing: float = 40.0
-    caution: float = 10.0
+    base: Method = field(default_factory=lambda: WeightSearch("subspace", most=30))
+    flights: int = 3
+    caution: float = 3.0
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
-        study, mpc, model = lab.study, lab.study.mpc, subspace(lab.probe(self.probing))
-        controller = mpc.controller_for(model)
-        yield controller
+        controller = None
+        for controller in self.base.offers(lab):
+            yield controller
+        if not isinstance(controller, Controller):
+            return
+        study, mpc = lab.study, controller.mpc
         count, p, m = study.task.samples(mpc.sample_time), mpc.outputs, mpc.inputs
-        to_y, to_u = _answers(controller, model, count)
+        to_y, to_u = _answers(controller, count)
         to_change = to_u - np.roll(to_u, m, axis=0)
         to_change[:m] = to_u[:m]
         Q, R = (
@@ -52,21 +58,24 @@ class IterativeLearning(Method):
             for weight, size, name in ((study.cost.Q, p, "Q of the cost"), (study.cost.R, m, "R of the cost"))
         )
         curvature = to_y.T @ Q @ to_y + to_change.T @ R @ to_change
-        shift, least = np.zeros((count, p)), np.inf
-        for run in itertools.count(1):
+        caution, least, best, downhill = self.caution, np.inf, np.zeros((count, p)), np.zeros(count * p)
+        shift = best
+        while True:
             pilot = _Shifted(controller, shift)
-            episode = lab.fly(pilot)
-            if (J := lab.cost(episode)) is None:
-                return
-            if least > J:
-                least = J
+            episodes = [lab.fly(pilot) for _ in range(self.flights)]
+            costs = [np.inf if (J := lab.cost(episode)) is None else J for episode in episodes]
+            if (J := np.mean(costs)) < least:
+                least, best = J, shift
                 yield pilot
-            error = (episode.reference - episode.output)[1:].ravel()
-            change = np.diff(np.vstack([episode.held, episode.tension]) / mpc.input_scale, axis=0).ravel()
-            # Each step is smaller than the one before, so that the noise of flights averages out.
-            normal = cho_factor(curvature + run * self.caution * Q)
-            step = cho_solve(normal, to_y.T @ Q @ error - to_change.T @ R @ change)
-            shift = shift + step.reshape(count, p)
+                errors = [(episode.reference - episode.output)[1:].ravel() for episode in episodes]
+                held = [np.vstack([episode.held, episode.tension]) / mpc.input_scale for episode in episodes]
+                change = np.mean([np.diff(inputs, axis=0).ravel() for inputs in held], axis=0)
+                downhill = to_y.T @ Q @ np.mean(errors, axis=0) - to_change.T @ R @ change
+            elif least == np.inf:
+                return
+            else:
+                caution *= 3
+            shift = best + cho_solve(cho_factor(curvature + caution * Q), downhill).reshape(count, p)
 
 
 class _Shifted:
@@ -75,6 +84,9 @@ class _Shifted:
     def __init__(self, controller: Controller, shift: np.ndarray) -> None:
         self.mpc, self._controller, self._shift, self._samples = controller.mpc, controller, shift, 0
         self._ahead = np.arange(self.mpc.reference_rows)
+
+    def prediction_error(self, record: Record) -> float:
+        return state_space_error(believed(self._controller), record)
 
     @property
     def info(self) -> ControllerInfo:
@@ -91,9 +103,9 @@ class _Shifted:
         return self._controller.step(y, np.atleast_2d(reference) + self._shift[rows], disturbance)
 
 
-def _answers(controller: Controller, model: StateSpace, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _answers(controller: Controller, count: int) -> tuple[np.ndarray, np.ndarray]:
     """How outputs (count p) and inputs as shares (count m) answer to a shift (count p), while no bound is active."""
-    mpc = controller.mpc
+    mpc, model = controller.mpc, believed(controller)
     p, m, size = mpc.outputs, mpc.inputs, 1e-3 * min(mpc.largest_output_bound, 1.0)
     to_y, to_u = np.zeros((count, p, count, p)), np.zeros((count, m, count, p))
     for i in range(p):

@@ -13,31 +13,29 @@ from ...mpc import LinearMPC
 from ...plant import SimulatedPlant
 from ...rod import Strain
 from ..lab import Forecast, Information, Lab, Law, Method, Program, looked_ahead, tuned
-from ._fixed import linearised
+from ._fixed import known_rod, linearised
 from ._sampled import sampled
 
 
 @dataclass(frozen=True)
 class NonlinearMPC(Method):
-    """MPC on a rod: what can be reached with a model of the robot, in real time or not.
+    """MPC on the rod that is known: what can be reached with a model of the robot, in real time or not.
 
     Gauss-Newton sequential quadratic programming (Diehl, Bock, Schlöder, "A real-time iteration scheme for nonlinear
-    optimization in optimal feedback control", SIAM J. Control and Optimization 43, 2005), each program started from the
-    solution before, on states that an extended Kalman filter estimates along with a constant disturbance of the
-    outputs. The bounds are those of the study's MPC; what it weighs and what the observer assumes is tuned by flights,
-    as in :class:`WeightSearch`.
+    optimization in optimal feedback control", SIAM J. Control and Optimization 43, 2005), one program a sample, started
+    from the solution before, on states that an extended Kalman filter estimates along with a constant disturbance of
+    the outputs. The bounds are those of the study's MPC; what it weighs and what the observer assumes is tuned by
+    flights, as in :class:`WeightSearch`.
 
     Parameters
     ----------
     model
-        ``"rod"``, the plant's own; ``"constant curvature"``, the same with one curvature about each axis along all of
+        ``"rod"``, as it is known; ``"constant curvature"``, the same with one curvature about each axis along all of
         its length and nothing else.
     horizon
         Samples that are looked ahead.
-    iterations
-        Programs a sample.
     tuned
-        Settings of the study's MPC that are tuned, each within two decades.
+        Settings of the study's MPC that are tuned, as of :class:`LinearMPC`.
     doubt
         The factor on ``"input_noise"`` that is flown first: a model that is the robot itself may be trusted, and one of
         constant curvature may not.
@@ -47,19 +45,16 @@ class NonlinearMPC(Method):
 
     model: Literal["rod", "constant curvature"] = "rod"
     horizon: int = 20
-    iterations: int = 1
-    tuned: tuple[str, ...] = ("R", "input_noise", "disturbance_noise")
+    tuned: tuple = ("R", ("input_noise", 1e-4, 100.0), ("disturbance_noise", 1e-4, 100.0))
     doubt: float = 0.01
-    trials: int = 30
+    trials: int = 60
 
     @property
     def information(self) -> Information:
         return "plant model"
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
-        plant = lab.study.plant
-        if not isinstance(plant, SimulatedPlant):
-            raise TypeError(f"only a simulated rod has a model to take, not {type(plant).__name__}")
+        plant = known_rod(lab)
         rod = plant.rod
         if self.model == "constant curvature":
             rod = replace(rod, strain=Strain(bending_y=0, bending_z=0))
@@ -67,7 +62,7 @@ class NonlinearMPC(Method):
         advance = compiled(sampled(believed, plant.inputs))
         # The rod takes the place of the model, so that nothing but the settings is left open.
         searched = replace(lab.study.mpc, model=Fixed.of(linearised(lab), plant.sample_time), tuned=self.tuned)
-        first = [self.doubt if name == "input_noise" else 1.0 for name in self.tuned]
+        first = [self.doubt if entry.name.startswith("input_noise") else 1.0 for entry in searched.entries]
         build = partial(_Controller, plant=believed, advance=advance, method=self)
         return tuned(lab, searched.entries, lambda x: build(searched.at(x)), initial=[first], most=self.trials)
 
@@ -91,12 +86,18 @@ class _Controller(Law):
         self._estimate(y)
         self._planned = np.vstack([self._planned[1:], self._planned[-1:]])
         wanted = looked_ahead(reference, self._method.horizon)
-        for _ in range(self._method.iterations):
-            self._planned = self._improved(wanted)
-            if not np.isfinite(self._planned).all():
-                self._planned = np.tile(self.held, (self._method.horizon, 1))
-                return np.full(self.mpc.inputs, np.nan)
+        self._planned = self._improved(wanted)
+        if not np.isfinite(self._planned).all():
+            self._planned = np.tile(self.held, (self._method.horizon, 1))
+            return np.full(self.mpc.inputs, np.nan)
         return self._planned[0]
+
+    def predicted(self, tension: np.ndarray) -> np.ndarray:
+        x, outputs = self._rod.equilibrium(np.zeros(self.mpc.inputs)).state, []
+        for u in tension:
+            x, *_, y, _ = self._sample(x, u)
+            outputs.append(y)
+        return np.array(outputs)
 
     def _sample(self, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, ...]:
         """State a sample later, its derivatives by x and u, output then, its derivative by that state."""

@@ -4,18 +4,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...campaign import Pilot
-from ...model import Entry
+from ...model import Entry, subspace
 from ...mpc import LinearMPC
-from ..lab import Lab, Law, Method, identified, static_gain, tuned
+from ..lab import Lab, Law, Method, static_gain, tuned
 
 
 @dataclass(frozen=True)
 class PID(Method):
     r"""Three terms per output through the inverse static Jacobian, which an identified model gives:
 
-    .. math:: u = G^+ (r + k_p e + k_i \int e\, dt + k_d \dot e_f)
+    .. math:: u = G^+ (f r + k_p e + k_i \int e\, dt + k_d \dot e_f)
 
-    with the error's derivative filtered. The four numbers are tuned by flights.
+    with the error's derivative filtered. It sees the reference of the next sample, and no further. The five numbers are
+    tuned by flights.
 
     Parameters
     ----------
@@ -23,18 +24,19 @@ class PID(Method):
         s of probing.
     """
 
-    probing: float = 20.0
+    probing: float = 40.0
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
-        inverse = np.linalg.pinv(static_gain(identified(lab, self.probing)))
+        inverse = np.linalg.pinv(static_gain(subspace(lab.probe(self.probing))))
         knobs = (
             Entry("proportional", "1", 0.01, 10.0, "log"),
             Entry("integral", "1/s", 0.05, 20.0, "log"),
             Entry("derivative", "s", 0.001, 2.0, "log"),
             Entry("filter", "s", 0.01, 1.0, "log"),
+            Entry("fed forward", "1", 0.0, 1.0),
         )
         mpc = lab.study.mpc
-        return tuned(lab, knobs, lambda gains: _Controller(mpc, inverse, gains), initial=[(0.1, 1.0, 0.05, 0.1)])
+        return tuned(lab, knobs, lambda gains: _Controller(mpc, inverse, gains), initial=[(0.1, 1.0, 0.05, 0.1, 1.0)])
 
 
 class _Controller(Law):
@@ -48,13 +50,13 @@ class _Controller(Law):
         self._error: np.ndarray | None = None
 
     def act(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
-        proportional, integral, derivative, filtered = self._gains
+        proportional, integral, derivative, filtered, forward = self._gains
         time, error = self.mpc.sample_time, reference[0] - y
         if self._error is not None:
             smooth = time / (time + filtered)
             self._slope = self._slope + smooth * ((error - self._error) / time - self._slope)
         self._error = error
-        known = reference[0] + proportional * error + derivative * self._slope
+        known = forward * reference[0] + proportional * error + derivative * self._slope
         summed = self._integral + time * error
         u = self._inverse @ (known + integral * summed)
         lower, upper = self.mpc.input_limits

@@ -7,9 +7,9 @@ from scipy.linalg import solve_continuous_are
 from scipy.signal import cont2discrete
 
 from ...campaign import Pilot
-from ...model import Entry, StateSpace
+from ...model import Entry, StateSpace, subspace
 from ...mpc import DesignError, LinearMPC
-from ..lab import Lab, Law, Method, identified, static_gain, tuned
+from ..lab import Lab, Law, Method, static_gain, tuned
 
 _ABOVE_LEAST = 1.1
 """gamma of the controller, as a factor on the least that there is."""
@@ -24,8 +24,8 @@ class HInfinity(Method):
     The plant, shaped by :math:`W = k (s + w) / s` in each channel, gets the controller that is the most robust against
     perturbations of its normalised coprime factors (McFarlane, Glover, "A loop-shaping design procedure using
     H-infinity synthesis", IEEE Trans. Automatic Control 37, 1992; formulas of Skogestad, Postlethwaite, "Multivariable
-    feedback control", 2005, section 9.4). The gain k, the corner w and a share of the reference that is fed forward are
-    tuned by flights.
+    feedback control", 2005, section 9.4). It sees the reference of the next sample, and no further. The gain k, the
+    corner w and a share of the reference that is fed forward are tuned by flights.
 
     Parameters
     ----------
@@ -33,10 +33,10 @@ class HInfinity(Method):
         s of probing.
     """
 
-    probing: float = 20.0
+    probing: float = 40.0
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
-        mpc, model = lab.study.mpc, identified(lab, self.probing)
+        mpc, model = lab.study.mpc, subspace(lab.probe(self.probing))
         inverse = np.linalg.pinv(static_gain(model))
         knobs = (
             Entry("gain", "1", 0.03, 30.0, "log"),

@@ -5,7 +5,8 @@ from typing import Literal
 from ...campaign import Pilot
 from ...model import Fixed, subspace
 from ...plant import Plant
-from ..lab import Lab, Method, identified, tuned
+from ..lab import Information, Lab, Method, identified, tuned
+from ._fixed import linearised
 
 
 @dataclass(frozen=True)
@@ -19,27 +20,52 @@ class WeightSearch(Method):
     ----------
     model
         ``"family"``, the member of the study's family that predicts a probing record best; ``"subspace"``, see
-        :func:`socasadi.model.subspace`.
+        :func:`socasadi.model.subspace`; ``"linearised"``, the rod that is known about rest, without a record.
     probing
         s of probing.
+    kind
+        ``"bayesian"``; ``"sobol"`` and ``"random"`` are points that learn nothing.
     tuned
-        Settings that theta holds, each within two decades, as of :class:`LinearMPC`. Of Q and R only the quotient
-        matters, and of the sensor's noise and the others.
+        Settings that theta holds, as of :class:`LinearMPC`. Of Q and R only the quotient matters, and of the sensor's
+        noise and the others.
     over, by
         Other robots on which every controller is flown beside the study's, and whether the mean or the worst J counts:
         a search for robustness, whose flights cost as many times the robot's time.
+    most
+        Trials, at most; None: as many as there is time for.
     """
 
-    model: Literal["family", "subspace"] = "family"
-    probing: float = 20.0
-    tuned: tuple[str, ...] = ("R", "input_noise", "disturbance_noise")
+    model: Literal["family", "subspace", "linearised"] = "family"
+    probing: float = 40.0
+    kind: Literal["bayesian", "sobol", "random"] = "bayesian"
+    tuned: tuple = ("R", "input_noise", "disturbance_noise")
     over: tuple[Callable[[Plant], Plant], ...] = ()
     by: Literal["mean", "worst"] = "mean"
+    most: int | None = None
+
+    @property
+    def information(self) -> Information:
+        return "plant model" if self.model == "linearised" else "other robots" if self.over else "data sheet"
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
+        match self.model:
+            case "family":
+                model = identified(lab, self.probing)
+            case "subspace":
+                model = subspace(lab.probe(self.probing))
+            case "linearised":
+                model = linearised(lab)
+            case _:
+                raise ValueError(f"unknown model {self.model!r}; there are family, subspace, linearised")
         mpc = lab.study.mpc
-        found = identified(lab, self.probing) if self.model == "family" else subspace(lab.probe(self.probing))
-        searched = replace(mpc, model=Fixed.of(found, mpc.sample_time), tuned=self.tuned)
+        searched = replace(mpc, model=Fixed.of(model, mpc.sample_time), tuned=self.tuned)
         return tuned(
-            lab, searched.entries, searched.controller, initial=[searched.whole(())], over=self.over, by=self.by
+            lab,
+            searched.entries,
+            searched.controller,
+            kind=self.kind,
+            initial=[searched.whole(())],
+            over=self.over,
+            by=self.by,
+            most=float("inf") if self.most is None else self.most,
         )

@@ -1,0 +1,40 @@
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from ...campaign import Study, Task
+from ..lab import Method
+
+if TYPE_CHECKING:
+    from ._comparison import Comparison
+
+
+def check_comparison(comparison: "Comparison") -> None:
+    """Raises what :class:`Comparison` says of its settings."""
+    if not isinstance(comparison.study, Study):
+        raise TypeError(f"study is a Study, not {comparison.study!r}")
+    for what, named, kinds in (("task", comparison.tasks, Task | Study), ("method", comparison.methods, Method)):
+        if not isinstance(named, Mapping) or not named:
+            raise TypeError(f"{what}s are a dictionary, at least one {what} by its name, not {named!r}")
+        for name, value in named.items():
+            if not isinstance(value, kinds):
+                raise TypeError(f"the {what} {name!r} is a {what.capitalize()}, not {value!r}")
+    for name in comparison.tasks:
+        if not name or set(name) & set("/\\"):
+            raise ValueError(f"the task {name!r} gives files their names: it is not empty and without slashes")
+    for what in ("seeds", "checkpoints"):
+        numbers, least = getattr(comparison, what), 0 if what == "seeds" else 1
+        if isinstance(numbers, str) or not isinstance(numbers, Sequence) or not numbers:
+            raise TypeError(f"{what} are several whole numbers, not {numbers!r}")
+        if any(not isinstance(n, int) or n < least for n in numbers) or len(set(numbers)) < len(numbers):
+            raise ValueError(f"{what} are different whole numbers from {least} on, not {list(numbers)}")
+    if list(comparison.checkpoints) != sorted(comparison.checkpoints):
+        raise ValueError(f"checkpoints are numbers of episodes that ascend, not {list(comparison.checkpoints)}")
+    if not isinstance(comparison.flights, int) or comparison.flights < 1:
+        raise ValueError(f"flights are at least 1 of each controller, not {comparison.flights!r}")
+    for name, other in comparison.elsewhere.items():
+        if not callable(other):
+            raise TypeError(f"elsewhere holds functions that make another robot of a plant; {name!r} is {other!r}")
+    if isinstance(comparison.elsewhere_on, str):
+        raise TypeError(f"elsewhere_on are names of tasks, not the text {comparison.elsewhere_on!r}")
+    if unknown := sorted(set(comparison.elsewhere_on) - set(comparison.tasks)):
+        raise ValueError(f"elsewhere_on names {unknown[0]!r}; the tasks are {', '.join(comparison.tasks)}")
