@@ -14,7 +14,7 @@ from socasadi.model import subspace
 
 plant = SimulatedPlant(Rod.preset("paper"), sample_time=0.05, noise=1e-3)
 bounds = (-10, 10)
-model = Fixed.of(subspace(probe(plant, bounds, duration=40.0)), plant.sample_time)
+model = Fixed.of(subspace(probe(plant, bounds, duration=40.0, hold=1.0)), plant.sample_time)
 
 study = Study(
     plant=plant,

@@ -15,8 +15,10 @@ def subspace(record: Record, order: int | None = None) -> StateSpace:
     """The stable model that N4SID finds in a record.
 
     Van Overschee, De Moor, "N4SID: subspace algorithms for the identification of combined deterministic-stochastic
-    systems", Automatica 30, 1994, as the package sippy_unipi has it. Unlike :func:`identify` it needs no family of
-    models, and no bounds; some 40 s of a record like :func:`probe`'s are enough for an arm of a few modes.
+    systems", Automatica 30, 1994, as the package sippy_unipi has it; the inputs' matrix B is then fitted to the whole
+    record, simulated from its start, which is linear least squares and makes the gain at rest more exact. Unlike
+    :func:`identify` it needs no family of models, and no bounds; some 40 s of a record like :func:`probe`'s are enough
+    for an arm of a few modes.
 
     Parameters
     ----------
@@ -59,5 +61,18 @@ def _n4sid(record: Record, order: int) -> StateSpace:
         SS_fixed_order=order,
         SS_A_stability=True,
     )
-    A, B, C = (np.asarray(getattr(found, name), dtype=float) for name in "ABC")
-    return StateSpace(A, B, C, np.zeros((len(C), B.shape[1])))
+    A, C = (np.asarray(getattr(found, name), dtype=float) for name in "AC")
+    return StateSpace(A, _input_matrix(A, C, record), C, np.zeros((len(C), record.tension.shape[1])))
+
+
+def _input_matrix(A: np.ndarray, C: np.ndarray, record: Record) -> np.ndarray:
+    """B (n, m) with which the model, simulated over the whole record, is the least off; the first state is free too."""
+    (samples, m), n = record.tension.shape, len(A)
+    # Columns: the states that each entry of B alone would give, column by column of B, and each first state.
+    states, rows = np.hstack([np.zeros((n, n * m)), np.eye(n)]), np.zeros((samples, len(C), n * (m + 1)))
+    for t, u in enumerate(record.tension):
+        states = A @ states
+        states[:, : n * m] += np.kron(u, np.eye(n))
+        rows[t] = C @ states
+    fitted = np.linalg.lstsq(rows.reshape(samples * len(C), -1), record.output[1:].ravel(), rcond=1e-12)[0]
+    return fitted[: n * m].reshape(m, n).T

@@ -56,8 +56,10 @@ class Lab:
         then = self.spent + flights * self.study.task.duration
         return any(self.spent <= at + _ROUNDING < then for at in self.checkpoints)
 
-    def probe(self, duration: float = 20.0) -> Record:
+    def probe(self, duration: float = 20.0, hold: float = 1.0) -> Record:
         """A probing record of so many s: random steps of all tensions, half of the way to their bounds at most.
+
+        Each is held for ``hold`` s: the shorter, the less is told of the gain at rest, on which all tracking stands.
 
         Raises
         ------
@@ -67,7 +69,7 @@ class Lab:
         self._check(duration)
         self.probes += 1
         seed = int(np.random.SeedSequence([self.study.seed, _PROBE, self.probes]).generate_state(1)[0])
-        record = probe(self.study.plant, self.study.mpc.input_bounds, duration=duration, seed=seed)
+        record = probe(self.study.plant, self.study.mpc.input_bounds, duration=duration, hold=hold, seed=seed)
         self.spent += duration
         return record
 
