@@ -33,7 +33,7 @@ def compare(
     folder: Annotated[Path | None, typer.Option("--out", help="Its results; runs/NAME-SIZE by default.")] = None,
 ) -> None:
     """Compare ways to get a controller at equal cost. A stopped comparison goes on when it is given again."""
-    from .baselines import Summary, load_comparison, run_comparison, summary_table
+    from .baselines import Summary, fitting_cells, load_comparison, run_comparison, summary_table
     from .report import comparison_figures, save_figures  # matplotlib takes its time
 
     if smoke and quick:
@@ -42,12 +42,10 @@ def compare(
         raise RunError(f"--jobs is at least 1, not {jobs}")
     size = "smoke" if smoke else "quick" if quick else "full"
     parts = {"tasks": tasks or (), "methods": methods or (), "seeds": seeds}
-    comparison = load_comparison(script, size).of_parts(**parts)
+    full = load_comparison(script)
+    whole = full.of_size(size)
     folder = folder or Path("runs") / f"{script.stem}-{size}"
-    out.print(
-        f"{script}, {size}: {comparison.extent}, {comparison.checkpoints[-1]} episodes' worth of the robot's time for "
-        f"each method, into {folder}"
-    )
+    out.print(f"{script}, {size}: {whole.of_parts(**parts).extent} for each method, into {folder}")
     began, first = time.monotonic(), [0]
 
     def told(cell: dict[str, Any], done: int, total: int) -> None:
@@ -60,35 +58,51 @@ def compare(
         with interruptible(), ExitStack() as stack:
             here = jobs or os.cpu_count() or 1
             executor = stack.enter_context(dask_executor(dask) if dask else Processes(here))
-            cells = run_comparison(script, size, folder, executor, told, **parts)
+            run_comparison(script, size, folder, executor, told, **parts)
     except KeyboardInterrupt:
         out.print("\nStopped. Every finished cell is stored; the same command goes on.")
         raise typer.Exit(130) from None
-    summary = Summary.of(cells, list(comparison.tasks), list(comparison.methods))
+    # A part that was flown by itself does not take the others out of the tables.
+    cells = fitting_cells(whole, folder)
+    summary = Summary.of(cells, *_told(whole, cells))
     rows = summary_table(summary)
+    hidden = ("task", "knows", "seeds")
     for task in summary.tasks:
-        shown = [{k: v for k, v in row.items() if k not in ("task", "knows")} for row in rows if row["task"] == task]
+        shown = [{k: v for k, v in row.items() if k not in hidden} for row in rows if row["task"] == task]
         title = f"\n{task}, after {summary.checkpoints[-1]} episodes' worth of the robot's time:"
         out.print(table(shown, left=("method",), title=title))
-    files = [_written(rows, folder / "table.csv")]
+    files = [_written(size, rows, folder / "table.csv")]
     if rivals := _rivals(summary):
-        out.print(table(rivals, left=("method", "knows"), title=f"\n{summary.methods[0]} against, in J:"))
-        files.append(_written(rivals, folder / "against.csv"))
-    for task in comparison.elsewhere_on:
+        title = f"\n{summary.methods[0]} against, in J; how much higher theirs is, median and quartiles over seeds:"
+        out.print(table(rivals, left=("method", "knows"), title=title))
+        files.append(_written(size, rivals, folder / "against.csv"))
+    for task in (task for task in whole.elsewhere_on if task in summary.tasks):
         if not (others := _elsewhere(summary, task)):
             continue  # no method had a controller to fly there
         out.print(table(others, left=("method",), title=f"\n{task}, J on other robots:"))
-        files.append(_written(others, folder / f"elsewhere-{task}.csv"))
-    drawn = save_figures(comparison_figures(summary, comparison, size), folder / "figures")
+        files.append(_written(size, others, folder / f"elsewhere-{task}.csv"))
+    drawn = save_figures(comparison_figures(summary, full, size), folder / "figures")
     for file in (*files, *drawn):
         out.print(str(file))
+    for cell in cells:
+        if cell["broke"]:
+            out.print(f"broke off: {_line(cell)}")
+        elif why := next((point["failure"] for point in cell["points"] if point and point["failure"]), None):
+            out.print(f"failed: {cell['task']}, {cell['method']}, seed {cell['seed']}: {why}")
 
 
-def _written(rows: list[dict[str, str]], file: Path) -> Path:
+def _told(comparison: Any, cells: list[dict[str, Any]]) -> tuple[list[str], list[str]]:
+    """Tasks and methods of which there is anything, in the order of the comparison."""
+    there = [{cell[kind] for cell in cells} for kind in ("task", "method")]
+    tasks, methods = [name for name in comparison.tasks if name in there[0]], list(comparison.methods)
+    return tasks, [name for name in methods if name in there[1]]
+
+
+def _written(size: str, rows: list[dict[str, str]], file: Path) -> Path:
     with file.open("w", newline="", encoding="utf-8") as text:
-        write = csv.DictWriter(text, rows[0], lineterminator="\n")
+        write = csv.DictWriter(text, ["size", *rows[0]], lineterminator="\n")
         write.writeheader()
-        write.writerows(rows)
+        write.writerows({"size": size, **row} for row in rows)
     return file
 
 
@@ -104,18 +118,20 @@ def _line(cell: dict[str, Any]) -> str:
 
 
 def _rivals(summary: Any) -> list[dict[str, str]]:
-    rows = []
-    for method in summary.methods[1:]:
-        cells = [cell for task in summary.tasks for cell in summary.of_pair(task, method)]
-        if not cells:
+    rows: dict[str, dict[str, str]] = {}
+    for at, points in enumerate(summary.checkpoints):
+        if points not in (30, summary.checkpoints[-1]):
             continue
-        row = {"method": method, "knows": cells[0]["information"]}
-        for at, points in enumerate(summary.checkpoints):
-            if points in (30, summary.checkpoints[-1]):
-                won, tasks, p = summary.rivalry(method, at)
-                row |= {f"no worse on, at {points}": f"{won} of {tasks}", f"p, at {points}": f"{p:.2g}"}
-        rows.append(row)
-    return rows
+        for method, rivalry in summary.rivalries(at).items():
+            knows = next(c["information"] for task in summary.tasks for c in summary.of_pair(task, method))
+            low, middle, high = (f"{100 * share:+.1f}" if share < 10 else "far" for share in rivalry.excess)
+            rows.setdefault(method, {"method": method, "knows": knows})
+            rows[method] |= {
+                f"no worse on, at {points}": f"{rivalry.won} of {rivalry.tasks}",
+                f"higher by %, at {points}": f"{middle} ({low} to {high})",
+                f"p, at {points}": f"{rivalry.p:.2g}" if np.isfinite(rivalry.p) else "-",
+            }
+    return list(rows.values())
 
 
 def _elsewhere(summary: Any, task: str) -> list[dict[str, str]]:

@@ -58,11 +58,12 @@ def test_every_method_brings_a_controller_in_the_smoke_comparison(smoke):
     with (folder / "runs" / "compare-smoke" / "against.csv").open() as file:
         rivals = {row["method"] for row in csv.DictReader(file)}
     assert rivals == {row["method"] for row in rows} - {"socasadi"}
+    assert {row["size"] for row in rows} == {"smoke"}
     assert "[1/" in done.stdout
     assert "left" in done.stdout
 
 
-def test_its_figures_say_which_size_they_are_of(smoke):
+def test_its_figures_are_drawn(smoke):
     folder, _, _ = smoke
     figures = folder / "runs" / "compare-smoke" / "figures"
     assert {file.stem for file in figures.glob("*.png")} == {"cost", "rmse", "methods", "paths", "elsewhere"}

@@ -8,7 +8,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from ..baselines import Comparison, Summary
+from ..baselines import Comparison, Size, Summary
 from ..campaign import Study, Units
 from ._style import BLACK, BLUE, GREY, MM, ORANGE, PAGE, SETTINGS
 
@@ -19,17 +19,21 @@ _HIGHEST = 6.0
 """Times the least, above which values stand on the upper edge."""
 
 
-def comparison_figures(summary: Summary, comparison: Comparison, size: str) -> dict[str, Figure]:
+def comparison_figures(summary: Summary, comparison: Comparison, size: Size) -> dict[str, Figure]:
     """The figures of a comparison by name: cost and rmse over the robot's time, methods, paths, elsewhere.
 
     Parameters
     ----------
+    comparison
+        In its full size.
     size
-        Which one it was, which each figure says.
+        Of what was flown, which each figure says, and what it leaves out.
     """
+    whole, comparison = comparison, comparison.of_size(size)
+    comparison = comparison.of_parts(summary.tasks, summary.methods, len(summary.seeds))
     note = f"{size}: {comparison.extent}"
-    if size != "full":
-        note += f"; less than the full comparison: up to {summary.checkpoints[-1]} episodes' worth of time"
+    if comparison.extent != whole.extent:
+        note += f" (the full comparison: {whole.extent})"
     factor, unit = Units.of(comparison.study.plant).shown
     with matplotlib.rc_context(SETTINGS):
         drawn = {
@@ -200,7 +204,7 @@ def _elsewhere(summary: Summary, task: str, note: str) -> Figure:
     place.set_yticks(range(len(methods)), methods)
     place.tick_params(length=0)
     place.set_title(
-        f"{task}: J on robots that it was not made for; the darker, the more times J on its own", loc="left"
+        f"{task}: J on robots that it was not tuned on; the darker, the more times J on its own", loc="left"
     )
     for side in place.spines.values():
         side.set_visible(False)

@@ -23,13 +23,15 @@ from socasadi.baselines import (
     Rubbing,
     Softer,
     Summary,
+    fitting_cells,
     fly_cell,
     load_comparison,
     run_comparison,
     stored_cells,
-    summary_table,
+    worth,
 )
 from socasadi.campaign import Pilot, RunError
+from socasadi.report import comparison_figures
 
 SCRIPT = """
 from baselines_support import study
@@ -103,9 +105,11 @@ def comparison(**changes):
 def test_what_counts_at_a_checkpoint_is_the_last_controller_before_it():
     cell = fly_cell(comparison(), "circle", "better", 0)
     first, second, third = cell["points"]
-    assert first["J"] == pytest.approx(first["J"])
+    poor = worth(comparison().of("circle", 0), next(Better().offers(Lab(comparison().of("circle", 0), (6.0,)))), 2)[0]
+    assert first["J"] == pytest.approx(poor.J, rel=1e-6)
     assert (first["spent"], second["spent"], third["spent"]) == (0.0, 12.0, 12.0)
     assert max(second["J"]) < min(first["J"])
+    assert second["failure"] is None
     assert second == third
     assert cell["flights"] == 2
     assert json.loads(json.dumps(cell, allow_nan=False)) == cell
@@ -120,6 +124,30 @@ def test_a_method_that_breaks_keeps_what_it_had_and_one_without_a_controller_has
     assert never["broke"] is None
 
 
+def test_what_is_no_controller_breaks_the_method_off_and_not_the_comparison():
+    @dataclass(frozen=True)
+    class Forgetful(Method):
+        def offers(self, lab: Lab) -> Iterator[Pilot]:
+            yield None  # pyright: ignore[reportReturnType]
+
+    cell = fly_cell(comparison(methods={"forgetful": Forgetful()}), "circle", "forgetful", 0)
+    assert cell["broke"] == "TypeError: offers yields controllers, which have an mpc; not None"
+
+
+def test_a_plant_of_which_a_task_differs_is_not_known():
+    @dataclass(frozen=True)
+    class Reads(Method):
+        def offers(self, lab: Lab) -> Iterator[Pilot]:
+            seen.append((lab.known, lab.study.plant))
+            yield from ()
+
+    seen: list = []
+    other = LinearPlant()
+    made = comparison(methods={"reads": Reads()}, tasks={"another": study(other)})
+    fly_cell(made, "another", "reads", 0)
+    assert seen == [(made.study.plant, other)]
+
+
 def test_a_failed_flight_is_null_and_counts_as_infinite():
     class Torn(LinearPlant):
         def step(self, tension, tip_force=None):
@@ -130,6 +158,7 @@ def test_a_failed_flight_is_null_and_counts_as_infinite():
     made = comparison(study=study(Torn()))
     cell = fly_cell(made, "circle", "better", 0)
     assert cell["points"][-1]["J"] == [None, None]
+    assert "a cable tore" in cell["points"][-1]["failure"]
     summary = Summary.of([cell], ["circle"], ["better"])
     assert summary.values("circle", "better", "J") == [np.inf]
 
@@ -157,6 +186,53 @@ def test_cells_are_kept_and_only_what_is_missing_or_changed_is_flown(tmp_path):
     script.write_text(SCRIPT)
     assert len(changed) == len(run_comparison(script, "full", out, some)) == 8
     assert some.done == 5
+
+
+def test_a_method_of_ones_own_that_was_edited_or_broke_off_is_flown_again(tmp_path):
+    own = """
+from socasadi.baselines import Law, Method
+
+GAIN = 0.0
+
+class Holding(Law):
+    def begin(self):
+        pass
+
+    def act(self, y, reference):
+        return GAIN + 0 * self.held
+
+class Mine(Method):
+    def offers(self, lab):
+        yield Holding(lab.study.mpc)
+"""
+    (script := tmp_path / "script.py").write_text(
+        own + SCRIPT.replace('"identified": Identified(6.0)', '"own": Mine()')
+    )
+    run_comparison(script, "full", tmp_path / "out", first := Here())
+    run_comparison(script, "full", tmp_path / "out", again := Here())
+    assert (first.done, again.done) == (8, 0)
+    for old, new in (
+        ("GAIN = 0.0", "GAIN = 1.0"),
+        ("GAIN + 0", "GAIN + 2"),
+        ("yield Holding", "raise ValueError; Holding"),
+    ):
+        script.write_text(script.read_text().replace(old, new))
+        run_comparison(script, "full", tmp_path / "out", edited := Here())
+        assert edited.done == 4
+    cells = run_comparison(script, "full", tmp_path / "out", broken := Here())
+    assert broken.done == 4
+    assert sum(cell["broke"] == "ValueError: " for cell in cells) == 4
+
+
+def test_a_part_that_is_flown_by_itself_leaves_the_others_in_the_folder(tmp_path):
+    (script := tmp_path / "script.py").write_text(SCRIPT)
+    run_comparison(script, "full", tmp_path, Here())
+    script.write_text(SCRIPT.replace("Identified(6.0)", "Identified(5.0)"))
+    assert len(run_comparison(script, "full", tmp_path, Here(), methods=["identified"], seeds=1)) == 2
+    flown = fitting_cells(load_comparison(script), tmp_path)
+    assert sorted((cell["method"], cell["seed"]) for cell in flown) == [
+        ("identified", 0), ("identified", 0), ("ours", 0), ("ours", 0), ("ours", 1), ("ours", 1),
+    ]  # fmt: skip
 
 
 def test_workers_that_know_an_older_script_are_not_believed(tmp_path):
@@ -244,6 +320,17 @@ def test_some_of_its_parts_are_flown_by_themselves():
     [
         ({"methods": {}}, TypeError, "at least one method"),
         ({"checkpoints": (3, 2)}, ValueError, "ascend"),
+        ({"checkpoints": (1.5, 2)}, ValueError, r"whole numbers from 1 on, not \[1.5, 2\]"),
+        ({"checkpoints": ()}, TypeError, r"not \(\)"),
+        ({"seeds": (0, 0)}, ValueError, r"different whole numbers from 0 on, not \[0, 0\]"),
+        ({"seeds": 3}, TypeError, "seeds are several whole numbers, not 3"),
+        ({"flights": 0}, ValueError, "at least 1 of each controller, not 0"),
+        ({"study": 3}, TypeError, "study is a Study, not 3"),
+        ({"tasks": [Circle()]}, TypeError, "tasks are a dictionary"),
+        ({"tasks": {"circle": 0.03}}, TypeError, "'circle' is a Task, not 0.03"),
+        ({"tasks": {"a/b": Circle()}}, ValueError, "'a/b' gives files their names"),
+        ({"elsewhere": {"dead": 3}}, TypeError, "'dead' is 3"),
+        ({"elsewhere_on": "circle"}, TypeError, "not the text 'circle'"),
         ({"methods": {"x": Better}}, TypeError, "'x' is a Method"),
         ({"elsewhere_on": ("square",)}, ValueError, "'square'; the tasks are circle"),
     ],
@@ -259,45 +346,26 @@ def test_a_script_without_a_comparison_says_what_to_write(tmp_path):
         load_comparison(Path(script))
 
 
-def made_up(costs):
-    """Cells of two methods, costs by method as (tasks, seeds)."""
-    point = {"rmse": [1e-3], "settled": 1e-3, "violated": 0.0, "effort": 0.1, "solve": [1e-5] * 3, "spent": 20.0}
-    return [
-        {
-            "task": f"task {i}",
-            "method": method,
-            "seed": seed,
-            "information": "data sheet",
-            "checkpoints": [30],
-            "points": [point | {"J": [J]}],
-            "elsewhere": {},
-            "open_loop": None,
-            "flights": 30,
-            "failed": 1,
-        }
-        for method, rows in costs.items()
-        for i, row in enumerate(rows)
-        for seed, J in enumerate(row)
-    ]
+def test_a_figure_says_how_much_was_flown_and_how_much_that_is_of():
+    full = comparison(seeds=tuple(range(10)), checkpoints=(1, 2, 3, 110), flights=1)
+    flown = full.of_size("quick").of_parts(methods=["better"], seeds=1)
+    summary = Summary.of([fly_cell(flown, "circle", "better", 0)], ["circle"], ["better"])
+    for figure in comparison_figures(summary, full, "quick").values():
+        assert figure.get_suptitle() == (
+            "quick: 1 method, 1 task, 1 seed, 1 flight each, 3 episodes' worth of the robot's time "
+            "(the full comparison: 3 methods, 1 task, 10 seeds, 1 flight each, 110 episodes' worth of the robot's time)"
+        )
 
 
-def test_a_rival_is_beaten_task_by_task_and_by_a_rank_test():
-    def rivalry(ours, theirs):
-        tasks = [f"task {i}" for i in range(len(ours))]
-        return Summary.of(made_up({"ours": ours, "theirs": theirs}), tasks, ["ours", "theirs"]).rivalry("theirs")
-
-    theirs = np.exp(np.random.default_rng(0).standard_normal((3, 8)))
-    won, tasks, p = rivalry(theirs * np.linspace(0.8, 0.95, 24).reshape(3, 8), theirs)
-    assert (won, tasks) == (3, 3)
-    assert p == pytest.approx(2 * 0.5**24)  # all 24 differences have one sign, and none is like another
-    assert rivalry(theirs, theirs[:, ::-1])[2] > 0.05
-    assert np.isnan(rivalry([[1.0]], [[2.0]])[2])
-
-
-def test_the_table_has_a_row_for_each_task_and_method():
-    summary = Summary.of(made_up({"ours": [[2.0, 4.0, np.inf]]}), ["task 0"], ["ours", "absent"])
-    (row,) = summary_table(summary)
-    assert (row["J"], row["RMSE / mm"], row["failed"], row["open loop / mm"]) == ("4", "1", "3 of 90", "-")
+def test_robots_that_cannot_be_are_refused():
+    plant = rod_study().plant
+    for other, fault in (
+        (Misrouted(1.2, cable=9), "no cable 9"),
+        (DeadCable(3), "are 0 to 2"),
+        (Delayed(-1), "not -1"),
+    ):
+        with pytest.raises(ValueError, match=fault):
+            other(plant)
 
 
 def test_other_robots_differ_in_what_they_say():

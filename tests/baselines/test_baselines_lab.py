@@ -18,6 +18,7 @@ from socasadi.baselines import (
     static_gain,
     tuned,
 )
+from socasadi.baselines.lab import _tuned
 from socasadi.campaign import Pilot
 from socasadi.codegen import c_compiler
 from socasadi.model import Entry
@@ -84,28 +85,47 @@ def test_a_search_offers_its_best_at_every_checkpoint(kind):
     assert costs[1] <= 1.02 * costs[0]
 
 
-def test_a_search_for_robustness_counts_the_worst_robot_or_the_mean_and_pays_for_all():
-    class Weak(LinearPlant):
-        def step(self, tension, tip_force=None):
-            return super().step(0.6 * np.asarray(tension))
+class Weak(LinearPlant):
+    """Its cables pull with six tenths of what they are told."""
 
-    def told(by):
-        lab = Lab(study(), (5 * 12.0,))
-        costs = watched(lab)
-        entries = (Entry("x", "1", 0.5, 2.0, "log"),)
-        mpc = replace(lab.study.mpc, tuned=("R",))
-        build = lambda x: mpc.controller([*THETA, *x])  # noqa: E731
-        offers = tuned(lab, entries, build, over=(lambda plant: Weak(),), by=by)
-        with pytest.raises(BudgetSpent):
-            list(offers)
-        return lab, costs
+    def step(self, tension, tip_force=None):
+        return super().step(0.6 * np.asarray(tension))
 
-    for by in ("worst", "mean"):
-        lab, costs = told(by)
-        assert lab.spent == pytest.approx(60.0)
-        assert lab.flights == len(costs) == 10
-        # The weak robot is the dearer one in every pair.
-        assert all(weak > own for own, weak in zip(costs[::2], costs[1::2], strict=True))
+
+def test_a_search_for_robustness_pays_for_all_robots():
+    lab = Lab(study(), (5 * 12.0,))
+    costs = watched(lab)
+    entries = (Entry("x", "1", 0.5, 2.0, "log"),)
+    mpc = replace(lab.study.mpc, tuned=("R",))
+    with pytest.raises(BudgetSpent):
+        list(tuned(lab, entries, lambda x: mpc.controller([*THETA, *x]), over=(lambda plant: Weak(),), by="worst"))
+    assert lab.spent == pytest.approx(60.0)
+    assert lab.flights == len(costs) == 10
+    # The weak robot is the dearer one in every pair.
+    assert all(weak > own for own, weak in zip(costs[::2], costs[1::2], strict=True))
+
+
+def test_what_counts_of_several_robots_is_the_worst_or_the_mean():
+    lab = Lab(study(), (1e3,))
+    pilot = lab.study.mpc.controller(THETA)
+    own, weak = (lab.cost(lab.fly(pilot, number=1, plant=plant)) for plant in (None, Weak()))
+    worst, mean = (_tuned._flown(lab, pilot, [None, Weak()], by, None, 1) for by in ("worst", "mean"))
+    assert own is not None
+    assert weak is not None
+    assert weak > 1.5 * own
+    assert (worst.J, worst.at_least) == (pytest.approx(weak), None)
+    assert (mean.J, mean.at_least) == (pytest.approx((own + weak) / 2), None)
+    # The worst is proven to be hopeless as soon as one is.
+    cut = _tuned._flown(lab, pilot, [None, Weak()], "worst", 1.2 * own, 1)
+    assert cut.J is None
+    assert cut.at_least is not None
+    assert cut.at_least >= 1.2 * own
+
+
+def test_a_lab_without_an_end_is_none():
+    for checkpoints in ((), (2.0, 1.0), (0.0,)):
+        with pytest.raises(ValueError, match="seconds that ascend from more than 0"):
+            Lab(study(), checkpoints)
 
 
 def test_the_identified_model_is_the_robots_own():

@@ -5,7 +5,7 @@ from ._comparison import Comparison, Size
 from ._judge import Elsewhere, Worth, worth, worth_elsewhere
 from ._kept import stored_cells
 from ._others import DeadCable, Delayed, Loaded, Misrouted, Noisier, Rubbing, Softer
-from ._run import load_comparison, run_comparison
+from ._run import fitting_cells, load_comparison, run_comparison
 from ._summary import Summary, summary_table
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "Softer",
     "Summary",
     "Worth",
+    "fitting_cells",
     "fly_cell",
     "load_comparison",
     "run_comparison",

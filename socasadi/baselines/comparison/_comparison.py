@@ -115,7 +115,8 @@ class Comparison:
     def extent(self) -> str:
         """How much is flown, in words."""
         counts = {"method": len(self.methods), "task": len(self.tasks), "seed": len(self.seeds), "flight": self.flights}
-        return ", ".join(f"{count} {name}{'s' * (count != 1)}" for name, count in counts.items()) + " each"
+        told = ", ".join(f"{count} {name}{'s' * (count != 1)}" for name, count in counts.items())
+        return f"{told} each, {self.checkpoints[-1]} episodes' worth of the robot's time"
 
     @property
     def cells(self) -> list[tuple[str, str, int]]:

@@ -36,6 +36,13 @@ def order_cell(script: str, size: Size, task: str, method: str, seed: int) -> st
     return json.dumps(fly_cell(load_comparison(Path(script), size), task, method, seed))
 
 
+def fitting_cells(comparison: Comparison, folder: Path) -> list[dict[str, Any]]:
+    """The cells in a folder that were flown under the settings of a comparison; of several alike the last."""
+    known = {(cell["task"], cell["method"], cell["seed"], cell["digest"]): cell for cell in stored_cells(folder)}
+    keys = [(*names, comparison.digest(*names)) for names in comparison.cells]
+    return [known[key] for key in keys if key in known]
+
+
 def run_comparison(
     script: Path,
     size: Size,
@@ -48,6 +55,8 @@ def run_comparison(
     seeds: int | None = None,
 ) -> list[dict[str, Any]]:
     """Fly all cells that ``folder`` does not hold yet, each stored when it is done; return them all.
+
+    One that broke off is flown again.
 
     Parameters
     ----------
@@ -65,14 +74,9 @@ def run_comparison(
     """
     comparison = load_comparison(script, size).of_parts(tasks, methods, seeds)
     folder.mkdir(parents=True, exist_ok=True)  # what cannot be kept is not worth flying
-    known = {(c["task"], c["method"], c["seed"], c["digest"]): c for c in stored_cells(folder)}
-    cells: list[dict[str, Any]] = []
-    missing = []
-    for names in comparison.cells:
-        if cell := known.get((*names, comparison.digest(*names))):
-            cells.append(cell)
-        else:
-            missing.append(names)
+    cells = [cell for cell in fitting_cells(comparison, folder) if not cell["broke"]]
+    known = {(cell["task"], cell["method"], cell["seed"]) for cell in cells}
+    missing = [names for names in comparison.cells if names not in known]
     total, losses = len(comparison.cells), Counter()
     waiting: dict[Future, tuple[str, str, int]] = {}
     gone: list[BrokenExecutor] = []

@@ -1,12 +1,40 @@
 """What the cells of a comparison say, in numbers."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 Cell = Mapping[str, Any]
+
+
+_FEWEST = 6
+"""Seeds without which there is no rank test: of five all with one sign p is 0.06."""
+_HUGE = 1e300
+"""Stands for infinity where a mean of two is taken."""
+
+
+@dataclass(frozen=True)
+class Rivalry:
+    """How the first method stands against another, in J.
+
+    Attributes
+    ----------
+    won, tasks
+        Tasks on which its median over the seeds is no higher, of how many.
+    excess
+        By what share the other's J is higher: quartiles over the seeds of the geometric mean over the tasks.
+    p
+        Of there being no difference: Wilcoxon's signed-rank test on that mean, one number a seed (tasks of one seed
+        share noise and probing record, and do not count as several), corrected for the number of rivals after Holm;
+        NaN with fewer than six seeds.
+    """
+
+    won: int
+    tasks: int
+    excess: tuple[float, float, float]
+    p: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +58,18 @@ class Summary:
 
     @classmethod
     def of(cls, cells: Iterable[Cell], tasks: Sequence[str], methods: Sequence[str]) -> "Summary":
+        """Of several cells of one task, method and seed the last counts."""
+        last = {(cell["task"], cell["method"], cell["seed"]): cell for cell in cells}
         grouped: dict[tuple[str, str], list[Cell]] = {}
-        for cell in sorted(cells, key=lambda cell: cell["seed"]):
-            grouped.setdefault((cell["task"], cell["method"]), []).append(cell)
-        points = next((tuple(cell["checkpoints"]) for group in grouped.values() for cell in group), ())
+        for task, method, seed in sorted(last):
+            grouped.setdefault((task, method), []).append(last[task, method, seed])
+        points = next((tuple(cell["checkpoints"]) for cell in last.values()), ())
         return cls(tuple(tasks), tuple(methods), grouped, points)
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """Those of which there is anything."""
+        return tuple(sorted({cell["seed"] for group in self.cells.values() for cell in group}))
 
     def of_pair(self, task: str, method: str) -> Sequence[Cell]:
         """The cells of a task and a method, one a seed."""
@@ -47,28 +82,41 @@ class Summary:
 
     def over_time(self, task: str, method: str, name: str = "J") -> np.ndarray:
         """Quartiles (checkpoints, 3) over the seeds; those of infinite values are infinite."""
-        rows = [self.values(task, method, name, i) for i in range(len(self.checkpoints))]
-        return np.array([np.quantile(row, (0.25, 0.5, 0.75), method="nearest") for row in rows])
+        return np.array([_quartiles(self.values(task, method, name, i)) for i in range(len(self.checkpoints))])
 
-    def rivalry(self, method: str, checkpoint: int = -1) -> tuple[int, int, float]:
-        """How the first method stands against another, in J: tasks that it wins in the median, tasks, and p.
+    def rivalries(self, checkpoint: int = -1) -> dict[str, Rivalry]:
+        """How the first method stands against each other one, in J at a checkpoint by its index."""
+        rivals = {method: self._rivalry(method, checkpoint) for method in self.methods[1:]}
+        rivals = {method: rivalry for method, rivalry in rivals.items() if rivalry.tasks}
+        # Holm's correction for several tests, the least p first.
+        tested = sorted((name for name in rivals if np.isfinite(rivals[name].p)), key=lambda name: rivals[name].p)
+        held = 0.0
+        for i, name in enumerate(tested):
+            held = max(held, min(1.0, (len(tested) - i) * rivals[name].p))
+            rivals[name] = replace(rivals[name], p=held)
+        return rivals
 
-        p is that of Wilcoxon's signed-rank test over all pairs of task and seed, on the logarithm of their quotient, of
-        there being no difference; NaN where there are fewer than six pairs.
-        """
+    def _rivalry(self, method: str, checkpoint: int) -> Rivalry:
+        """Without a correction of p."""
         from scipy.stats import wilcoxon  # takes its time to import
 
-        first, won, ratios = self.methods[0], 0, []
+        first = self.methods[0]
         tasks = [task for task in self.tasks if self.of_pair(task, first) and self.of_pair(task, method)]
+        won, quotients = 0, []
         for task in tasks:
-            ours, theirs = (self.values(task, name, "J", checkpoint) for name in (first, method))
-            won += bool(np.median(ours) <= np.median(theirs))
-            for a, b in zip(ours, theirs, strict=False):
-                if np.isfinite(a) or np.isfinite(b):
-                    ratios.append(np.clip(np.log(a) - np.log(b), -50, 50))
-        if len(ratios) < 6 or not np.any(ratios):
-            return won, len(tasks), np.nan
-        return won, len(tasks), float(wilcoxon(ratios)[1])  # pyright: ignore[reportArgumentType]
+            ours, theirs = (
+                dict(zip((cell["seed"] for cell in self.of_pair(task, name)), values, strict=True))
+                for name in (first, method)
+                for values in [self.values(task, name, "J", checkpoint)]
+            )
+            won += bool(np.median([*ours.values()]) <= np.median([*theirs.values()]))
+            quotients.append({seed: _log_quotient(theirs[seed], ours[seed]) for seed in ours if seed in theirs})
+        seeds = [seed for seed in (quotients[0] if tasks else ()) if all(seed in row for row in quotients)]
+        means = np.array([np.mean([row[seed] for row in quotients]) for seed in seeds])
+        tested = len(means) >= _FEWEST and np.any(means)
+        p = float(wilcoxon(means)[1]) if tested else np.nan  # pyright: ignore[reportArgumentType]
+        low, middle, high = np.expm1(_quartiles(means)).tolist()
+        return Rivalry(won, len(tasks), (low, middle, high), p)
 
     def elsewhere(self, task: str) -> tuple[list[str], dict[str, np.ndarray]]:
         """Names of other robots, and by method J there (robots,), medians over flights and seeds; infinite: failed."""
@@ -88,8 +136,26 @@ def _median(value: Any) -> float:
     return float(np.median(values))
 
 
+def _quartiles(values: np.ndarray) -> tuple[float, float, float]:
+    """Of values that may be infinite."""
+    if not len(values):
+        return (np.inf, np.inf, np.inf)
+    parts = np.quantile(np.minimum(values, _HUGE), (0.25, 0.5, 0.75))
+    low, middle, high = np.where(parts > _HUGE / 1e10, np.inf, parts).tolist()
+    return low, middle, high
+
+
+def _log_quotient(a: float, b: float) -> float:
+    """Of two J, within bounds where one of them is infinite; 0 where both are."""
+    return 0.0 if np.isinf(a) and np.isinf(b) else float(np.clip(np.log(a) - np.log(b), -50, 50))
+
+
 def summary_table(summary: Summary, checkpoint: int = -1) -> list[dict[str, str]]:
-    """One row a task and method: texts by heading, medians over flights and seeds."""
+    """One row a task and method: texts by heading.
+
+    They are medians over flights and seeds, but for the longest step, which is that of all, and counts of what failed:
+    of the flights that were judged, and of those before, in which the method was tuned.
+    """
     rows = []
     for task in summary.tasks:
         for method in summary.methods:
@@ -103,12 +169,15 @@ def summary_table(summary: Summary, checkpoint: int = -1) -> list[dict[str, str]
 
             points = [cell["points"][checkpoint] for cell in cells]
             solve = np.array([p["solve"] for p in points if p and None not in p["solve"]], dtype=float)
-            steps = [f"{1e6 * t:,.0f}" for t in np.median(solve, axis=0)] if len(solve) else ["-"] * 3
+            typical = (*np.median(solve[:, :2], axis=0), solve[:, 2].max()) if len(solve) else ()
+            steps = [f"{1e6 * t:.0f}" for t in typical] or ["-"] * 3
+            flown = [J for p in points if p for J in p["J"]]
             rows.append(
                 {
                     "task": task,
                     "method": method,
                     "knows": cells[0]["information"],
+                    "seeds": str(len(cells)),
                     "robot / s": told("spent", form=".0f"),
                     "J": told("J"),
                     "RMSE / mm": told("rmse", 1e3),
@@ -118,7 +187,8 @@ def summary_table(summary: Summary, checkpoint: int = -1) -> list[dict[str, str]
                     "step p50 / us": steps[0],
                     "p99 / us": steps[1],
                     "max / us": steps[2],
-                    "failed": f"{sum(c['failed'] for c in cells)} of {sum(c['flights'] for c in cells)}",
+                    "failed": f"{sum(J is None for J in flown)} of {len(flown)}",
+                    "while tuned": f"{sum(c['failed'] for c in cells)} of {sum(c['flights'] for c in cells)}",
                     "open loop / mm": _open_loop(cells),
                 }
             )
