@@ -66,7 +66,7 @@ def compare(
     cells = fitting_cells(whole, folder)
     summary = Summary.of(cells, *_told(whole, cells))
     rows = summary_table(summary)
-    hidden = ("task", "knows", "seeds")
+    hidden = ("task", "knows", "seeds", "p99 / us", "while tuned")  # which the file has
     for task in summary.tasks:
         shown = [{k: v for k, v in row.items() if k not in hidden} for row in rows if row["task"] == task]
         title = f"\n{task}, after {summary.checkpoints[-1]} episodes' worth of the robot's time:"
