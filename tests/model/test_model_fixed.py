@@ -11,9 +11,9 @@ THETA = np.array([4.4, 0.1, 0.0056, -0.0028, -0.0028, 4.7, 0.08, 0.0, 0.0049, -0
 SYSTEM = Modal().state_space(THETA, 0.05)
 
 
-def record(samples, noise=0.0):
+def record(samples, noise=0.0, hold=10):
     rng = np.random.default_rng(0)
-    u = np.repeat(rng.uniform(-5, 5, (samples // 10, 3)), 10, axis=0)
+    u = np.repeat(rng.uniform(-5, 5, (samples // hold, 3)), hold, axis=0)
     x, y = np.zeros(4), [np.zeros(2)]
     for row in u:
         x = SYSTEM.A @ x + SYSTEM.B @ row
@@ -53,6 +53,12 @@ def test_a_record_gives_the_model_back_with_its_order():
     for k in (0, 5, 20):
         theirs, true = (m.C @ np.linalg.matrix_power(m.A, k) @ m.B for m in (found, SYSTEM))
         np.testing.assert_allclose(theirs, true, atol=2e-5)
+
+
+def test_the_gain_at_rest_of_a_noisy_record_is_right_to_a_hundredth():
+    found = subspace(record(800, noise=1e-3, hold=20))
+    theirs, true = (m.C @ np.linalg.solve(np.eye(len(m.A)) - m.A, m.B) for m in (found, SYSTEM))
+    np.testing.assert_allclose(theirs, true, atol=0.01 * np.abs(true).max())
 
 
 def test_a_record_that_is_too_short_is_told_so():
