@@ -59,8 +59,7 @@ class _Controller(Law):
         known = forward * reference[0] + proportional * error + derivative * self._slope
         summed = self._integral + time * error
         u = self._inverse @ (known + integral * summed)
-        lower, upper = self.mpc.input_limits
-        if ((u >= lower) & (u <= upper)).all():  # at a bound the integral waits, lest it winds up
+        if (self.clipped(u) == u).all():  # at a bound the integral waits, lest it winds up
             self._integral = summed
             return u
         return self._inverse @ (known + integral * self._integral)

@@ -74,8 +74,7 @@ class _Controller(Law):
         answer = robust.C @ self._x + robust.D @ left - (1 - self._forward) * self._static @ wanted
         u = self._inverse @ (self._forward * wanted + shaper.C @ self._integral + shaper.D @ answer)
         self._x = robust.A @ self._x + robust.B @ left
-        lower, upper = self.mpc.input_limits
-        if ((u >= lower) & (u <= upper)).all():  # at a bound the integral waits, lest it winds up
+        if (self.clipped(u) == u).all():  # at a bound the integral waits, lest it winds up
             self._integral = shaper.A @ self._integral + shaper.B @ answer
         return u
 
