@@ -15,8 +15,8 @@ from ._style import BLACK, BLUE, GREY, MM, ORANGE, PAGE, SETTINGS
 _COLOURS = (ORANGE, "#009E73", "#CC79A7", "#56B4E9", "#E69F00", BLACK, GREY)
 _DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)))
 _MARKERS = "sD^vPX*"
-_HIGHEST = 6.0
-"""Times the least, above which values stand on the upper edge."""
+_HIGHEST = 3.0
+"""Times the least, above which values stand on the edge."""
 
 
 def comparison_figures(summary: Summary, comparison: Comparison, size: Size) -> dict[str, Figure]:
@@ -33,7 +33,7 @@ def comparison_figures(summary: Summary, comparison: Comparison, size: Size) -> 
     comparison = comparison.of_parts(summary.tasks, summary.methods, len(summary.seeds))
     note = f"{size}: {comparison.extent}"
     if comparison.extent != whole.extent:
-        note += f" (the full comparison: {whole.extent})"
+        note += f"\nThe full comparison: {whole.extent}"
     factor, unit = Units.of(comparison.study.plant).shown
     with matplotlib.rc_context(SETTINGS):
         drawn = {
@@ -140,8 +140,8 @@ def _methods(summary: Summary, note: str) -> Figure:
             place.plot([low, min(high, _HIGHEST)], [row, row], color=look["color"], lw=1.2)
             place.plot(middle, row, look["marker"], color=look["color"], ms=4)
         place.axvline(1.0, color=GREY, lw=0.6, ls=":")
-        place.set(xscale="log", xlim=(0.7, _HIGHEST), ylim=(-0.7, len(rows) - 0.3))
-        _plain_log(place.xaxis, (1, 2, 3, 5))
+        place.set(xscale="log", xlim=(0.8, _HIGHEST), ylim=(-0.7, len(rows) - 0.3))
+        _plain_log(place.xaxis, (1, 1.5, 2, 3))
     figure.supxlabel(
         f"J after {summary.checkpoints[-1]} episodes' worth of time, as a multiple of that of {summary.methods[0]}",
         fontsize=8,

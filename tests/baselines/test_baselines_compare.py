@@ -352,8 +352,8 @@ def test_a_figure_says_how_much_was_flown_and_how_much_that_is_of():
     summary = Summary.of([fly_cell(flown, "circle", "better", 0)], ["circle"], ["better"])
     for figure in comparison_figures(summary, full, "quick").values():
         assert figure.get_suptitle() == (
-            "quick: 1 method, 1 task, 1 seed, 1 flight each, 3 episodes' worth of the robot's time "
-            "(the full comparison: 3 methods, 1 task, 10 seeds, 1 flight each, 110 episodes' worth of the robot's time)"
+            "quick: 1 method, 1 task, 1 seed, 1 flight each, 3 episodes' worth of the robot's time\n"
+            "The full comparison: 3 methods, 1 task, 10 seeds, 1 flight each, 110 episodes' worth of the robot's time"
         )
 
 
