@@ -2,12 +2,14 @@
 
 import csv
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from socasadi.baselines import fitting_cells, load_comparison, stored_cells
 from socasadi.codegen import c_compiler
 
 NOTHING = """
@@ -99,3 +101,17 @@ def test_a_slip_is_answered_in_a_sentence(tmp_path, arguments, fault):
     assert done.returncode == 1
     assert fault in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_what_is_committed_was_flown_under_the_settings_that_are_committed(tmp_path):
+    """Every stored cell is one of the comparison as it stands, whole seeds of it, and the tables are made of them."""
+    results = ROOT / "studies" / "results" / "compare"
+    comparison, stored = load_comparison(ROOT / "studies" / "compare.py"), list(stored_cells(results))
+    seeds = sorted({cell["seed"] for cell in stored})
+    flown = comparison.of_parts(seeds=len(seeds))
+    assert len(fitting_cells(flown, results)) == len(flown.cells) == len(stored)
+    shutil.copy(results / "cells.jsonl", tmp_path)
+    again = compare(ROOT / "studies" / "compare.py", "--seeds", len(seeds), "--out", tmp_path, cwd=tmp_path)
+    assert "[1/" not in again.stdout
+    for table in ("table.csv", "against.csv", "elsewhere-circle.csv"):
+        assert (tmp_path / table).read_text() == (results / table).read_text()

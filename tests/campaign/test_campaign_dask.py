@@ -62,8 +62,8 @@ from socasadi.baselines import PID, Comparison, Linearised
 
 study = Study(plant=SimulatedPlant(Rod.preset("paper"), noise=1e-3), mpc=LinearMPC(Modal()), task=Circle(duration=1.0))
 comparison = Comparison(
-    study, tasks={"circle": study.task}, methods={"a": Linearised(), "b": PID(6.0)}, seeds=(0, 1),
-    checkpoints=(8,), flights=1,
+    study, tasks={"circle": study.task}, methods={"a": Linearised(), "b": PID(8.0)}, seeds=(0, 1),
+    checkpoints=(12,), flights=1,
 )
 """
 
