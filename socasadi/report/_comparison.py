@@ -150,7 +150,7 @@ def _methods(summary: Summary, note: str) -> Figure:
 
 
 def _paths(summary: Summary, comparison: Comparison, factor: float, unit: str, note: str) -> Figure:
-    """The true outputs of the first seed's last controllers in their plane, those of the least J."""
+    """The true outputs of the first seed's last controllers in their plane, from the least J to the largest."""
     figure, axes = _grid(summary, note, 58, 22)
     shown = _shown(summary)
     for place, task in zip(axes, summary.tasks, strict=False):
@@ -162,7 +162,7 @@ def _paths(summary: Summary, comparison: Comparison, factor: float, unit: str, n
         for method in shown:
             path = next((np.array(cell["path"]) for cell in summary.of_pair(task, method) if cell["path"]), None)
             if path is not None:
-                look: dict[str, Any] = _look(summary, method) | {"marker": ""}
+                look: dict[str, Any] = _look(summary, method) | {"marker": "", "lw": 1.0}
                 place.plot(*(factor * path.T), label=method, **look)
         place.set_aspect("equal", adjustable="datalim")
         place.set(xlabel=f"y / {unit}")
@@ -174,14 +174,15 @@ def _paths(summary: Summary, comparison: Comparison, factor: float, unit: str, n
 
 
 def _shown(summary: Summary, most: int = 6) -> Sequence[str]:
-    """The first method, and those of the others that are best in the median of their ranks."""
+    """The first method, and others from the best to the worst, in the median of their ranks: what is alike hides."""
     ranks: dict[str, list[float]] = {}
     for task in summary.tasks:
         costs = {m: np.median(summary.values(task, m, "J")) for m in summary.methods if summary.of_pair(task, m)}
         for rank, method in enumerate(sorted(costs, key=lambda m: costs[m])):
             ranks.setdefault(method, []).append(rank)
     others = sorted((m for m in ranks if m != summary.methods[0]), key=lambda m: float(np.median(ranks[m])))
-    return [summary.methods[0], *others[: most - 1]]
+    spread = np.unique(np.linspace(0, len(others) - 1, most - 1).round().astype(int)) if others else ()
+    return [summary.methods[0], *(others[i] for i in spread)]
 
 
 def _elsewhere(summary: Summary, task: str, note: str) -> Figure:
