@@ -32,14 +32,14 @@ compiled = pytest.mark.skipif(c_compiler() is None, reason="its program is solve
 
 FEW = {
     "weights": pytest.param(WeightSearch(probing=6.0), 1.2, marks=pytest.mark.slow),
-    "weights on N4SID": (WeightSearch("subspace", probing=12.0), 1.1),
+    "weights on N4SID": pytest.param(WeightSearch("subspace", probing=12.0), 1.1, marks=pytest.mark.slow),
     "PID": (PID(), 4.0),
-    "H-infinity": (HInfinity(probing=8.0), 4.0),
+    "H-infinity": pytest.param(HInfinity(probing=8.0), 4.0, marks=pytest.mark.slow),
     "N4SID": (Subspace(probing=12.0), 1.1),
     "ILC": (IterativeLearning(WeightSearch("subspace", probing=20.0, most=3), flights=1), 1.1),
     "Koopman": pytest.param(Koopman(probing=12.0), 3.0, marks=compiled),
     "DeePC": pytest.param(DeePC(probing=12.0), 2.0, marks=compiled),
-    "velocity DeePC": pytest.param(DeePC(velocity=True, probing=12.0), 3.0, marks=compiled),
+    "velocity DeePC": pytest.param(DeePC(velocity=True, probing=12.0), 3.0, marks=[compiled, pytest.mark.slow]),
 }
 
 
