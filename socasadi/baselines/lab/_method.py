@@ -3,6 +3,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from threadpoolctl import threadpool_limits
+
 from ...campaign import Pilot
 from ._lab import BudgetSpent, Lab
 
@@ -43,7 +45,8 @@ class Method(ABC):
         offered: list[Pilot] = []
         why = "its time was enough for all that it does"
         try:
-            offered.extend(self.offers(lab))
+            with threadpool_limits(1):  # its matrices are small: threads would wait for each other
+                offered.extend(self.offers(lab))
         except BudgetSpent as error:
             why = str(error)
         if not offered:
