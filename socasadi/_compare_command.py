@@ -64,7 +64,8 @@ def compare(
         raise typer.Exit(130) from None
     # A part that was flown by itself does not take the others out of the tables.
     cells = fitting_cells(whole, folder)
-    summary = Summary.of(cells, *_told(whole, cells))
+    flown = {cell[kind] for cell in cells for kind in ("task", "method")}
+    summary = Summary.of(cells, *([name for name in names if name in flown] for names in (whole.tasks, whole.methods)))
     rows = summary_table(summary)
     hidden = ("task", "knows", "seeds", "p99 / us", "while tuned")  # which the file has
     for task in summary.tasks:
@@ -89,13 +90,6 @@ def compare(
             out.print(f"broke off: {_line(cell)}")
         elif why := next((point["failure"] for point in cell["points"] if point and point["failure"]), None):
             out.print(f"failed: {cell['task']}, {cell['method']}, seed {cell['seed']}: {why}")
-
-
-def _told(comparison: Any, cells: list[dict[str, Any]]) -> tuple[list[str], list[str]]:
-    """Tasks and methods of which there is anything, in the order of the comparison."""
-    there = [{cell[kind] for cell in cells} for kind in ("task", "method")]
-    tasks, methods = [name for name in comparison.tasks if name in there[0]], list(comparison.methods)
-    return tasks, [name for name in methods if name in there[1]]
 
 
 def _written(size: str, rows: list[dict[str, str]], file: Path) -> Path:
