@@ -302,7 +302,8 @@ class TestStops:
     @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
     def test_no_worker_is_left_behind_and_nothing_told_is_lost(self, script, tmp_path, number):
         settings = "search='sobol', seed_points=24, iterations=0"
-        file = script("time.sleep(0.01)", settings)
+        wait = "while self.trial > 6 and not (FOLDER / 'go').exists(): time.sleep(0.01)"
+        file = script(wait, settings)
         process = self.start(file, tmp_path)
         assert len(processes_of(tmp_path)) >= 3
         process.send_signal(number)
@@ -317,6 +318,7 @@ class TestStops:
             told, out = journal.trials(), journal.pending()
         assert len(told) >= 1 + said.count("trial ") // 2
         assert 1 <= len(out) <= 2
+        (tmp_path / "go").touch()
         study = load_study(file)
         result = study.run(tmp_path / "run", resume=True, jobs=2, script=file, progress=None)
         assert [trial.number for trial in result.trials[: len(told)]] == [trial.number for trial in told]
