@@ -1,13 +1,12 @@
 """`socasadi check`, as a user runs it."""
 
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from command_support import socasadi
 
-from socasadi import Rod, SimulatedPlant, cli
+from socasadi import Rod, SimulatedPlant
 from socasadi.campaign import Campaign, Episode, Result, probe, read_probe, write_recording
 from socasadi.model import identify
 
@@ -19,29 +18,14 @@ study = Study(plant=arm, mpc=LinearMPC(Modal()), task=Circle(radius={radius}))
 """
 
 
-@pytest.fixture
-def socasadi(capsys, monkeypatch):
-    """The command; returns its exit code, what it printed, and what it printed of errors."""
-
-    def call(*arguments, cwd):
-        monkeypatch.chdir(cwd)
-        monkeypatch.setattr(sys, "argv", ["socasadi", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        told = capsys.readouterr()
-        return SimpleNamespace(returncode=ended.value.code or 0, stdout=told.out, stderr=told.err)
-
-    return call
-
-
-def test_a_sound_study_passes_with_a_picture(socasadi, tmp_path):
+def test_a_sound_study_passes_with_a_picture(tmp_path):
     done = socasadi("check", ROOT / "studies" / "circle.py", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "nothing stands against it" in done.stdout
     assert (tmp_path / "runs" / "circle-check" / "reach.png").stat().st_size > 5000
 
 
-def test_an_infeasible_study_ends_with_1_and_what_to_change(socasadi, tmp_path):
+def test_an_infeasible_study_ends_with_1_and_what_to_change(tmp_path):
     source = (ROOT / "studies" / "circle.py").read_text()
     (tmp_path / "study.py").write_text(source.replace("radius=0.05", "radius=0.15"))
     done = socasadi("check", "study.py", "--figures", "here", cwd=tmp_path)
@@ -51,7 +35,7 @@ def test_an_infeasible_study_ends_with_1_and_what_to_change(socasadi, tmp_path):
     assert (tmp_path / "here" / "reach.pdf").exists()
 
 
-def test_run_says_first_what_stands_against_it(socasadi, tmp_path):
+def test_run_says_first_what_stands_against_it(tmp_path):
     source = (ROOT / "studies" / "circle.py").read_text()
     short = source.replace("seed_points=10", "seed_points=1").replace("iterations=100", "iterations=0")
     short = short.replace("period=20.0", "period=20.0, duration=1.0").replace(
@@ -75,7 +59,7 @@ def recorded(tmp_path_factory):
     return file
 
 
-def test_a_real_robot_is_checked_by_its_record_and_its_data_sheet(socasadi, tmp_path, recorded):
+def test_a_real_robot_is_checked_by_its_record_and_its_data_sheet(tmp_path, recorded):
     (tmp_path / "arm.py").write_text(EXTERNAL.format(radius=0.05))
     unknown = socasadi("check", "arm.py", cwd=tmp_path)
     assert unknown.returncode == 0
@@ -97,7 +81,7 @@ def test_a_real_robot_is_checked_by_its_record_and_its_data_sheet(socasadi, tmp_
         (("arm.py", "--spec", "none.toml"), "there is no data sheet none.toml"),
     ],
 )
-def test_a_slip_is_answered_in_a_sentence(socasadi, tmp_path, arguments, fault):
+def test_a_slip_is_answered_in_a_sentence(tmp_path, arguments, fault):
     (tmp_path / "arm.py").write_text(EXTERNAL.format(radius=0.05))
     done = socasadi("check", *arguments, cwd=tmp_path)
     assert done.returncode != 0
@@ -105,7 +89,7 @@ def test_a_slip_is_answered_in_a_sentence(socasadi, tmp_path, arguments, fault):
     assert "Traceback" not in done.stderr
 
 
-def test_a_campaign_is_not_begun_from_a_record_in_another_unit(socasadi, tmp_path, recorded):
+def test_a_campaign_is_not_begun_from_a_record_in_another_unit(tmp_path, recorded):
     (tmp_path / "arm.py").write_text(EXTERNAL.format(radius=0.05))
     lines = [line.split(",") for line in recorded.read_text().splitlines()]
     heading = [name.split(" ")[0] for name in lines[0]]
@@ -122,7 +106,7 @@ def test_a_campaign_is_not_begun_from_a_record_in_another_unit(socasadi, tmp_pat
     assert socasadi("init", "arm.py", "--record", "mm.csv", "--anyway", cwd=tmp_path).returncode == 0
 
 
-def test_a_campaign_starts_from_what_fits_the_record(socasadi, tmp_path, recorded):
+def test_a_campaign_starts_from_what_fits_the_record(tmp_path, recorded):
     (tmp_path / "arm.py").write_text(EXTERNAL.format(radius=0.05))
     done = socasadi("init", "arm.py", "--record", recorded, cwd=tmp_path)
     assert done.returncode == 0, done.stderr

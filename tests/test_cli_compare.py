@@ -1,12 +1,10 @@
 """`socasadi compare` as a user meets it."""
 
 import csv
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from command_support import socasadi
 
 from socasadi.baselines import Summary, fitting_cells, load_comparison, stored_cells, summary_table
 from socasadi.codegen import c_compiler
@@ -30,12 +28,11 @@ ROOT = Path(__file__).parents[1]
 
 
 def compare(*arguments, cwd):
-    command = [sys.executable, "-m", "socasadi.cli", "compare", *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ)
+    return socasadi("compare", *arguments, cwd=cwd)
 
 
 WHOLE = load_comparison(ROOT / "studies" / "compare.py", "smoke")
-ALIKE = ("socasadi (Sobol)", "Sobol", "random", "weights", "velocity DeePC", "linearised (tuned)", "constant curvature")
+ALIKE = ("socasadi (Sobol)", "Sobol", "random", "weights", "velocity DeePC", "linearised (tuned)", "nonlinear MPC")
 """Methods that others share their code with."""
 FEW = (["circle"], [method for method in WHOLE.methods if method not in ALIKE])
 

@@ -268,10 +268,10 @@ def test_whatever_comes_in_the_inputs_keep_their_bounds_and_nothing_is_spoilt(tm
 @pytest.mark.parametrize(
     ("defined", "real"),
     [
-        ([], "double"),
         ([], "float"),
         (["-DRATED"], "double"),
         (["-DDISTURBED"], "float"),
+        pytest.param([], "double", marks=pytest.mark.slow),
         pytest.param(["-DRATED"], "float", marks=pytest.mark.slow),
         pytest.param(["-DDISTURBED"], "double", marks=pytest.mark.slow),
     ],
@@ -284,6 +284,7 @@ def test_sanitizers_find_nothing_in_it(tmp_path, defined, real):
 
 
 @with_compiler
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="no valgrind")
 def test_valgrind_finds_nothing_in_it(tmp_path):
     export(record(BUSY, samples=5), tmp_path, figures=False)

@@ -151,6 +151,7 @@ def test_time_is_scrubbed_by_the_keyboard(browser):
     assert path[0] == pytest.approx(path[1], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_play_is_reached_and_pressed_by_the_keyboard(browser):
     by_id(browser, "play").send_keys(selenium.Keys.SPACE)
     until(lambda: clock(browser) > 0.1)
@@ -176,13 +177,21 @@ def test_the_view_turns_and_zooms_by_buttons_keys_and_mouse(browser):
     until(lambda: eye(browser) != pytest.approx(start))
 
 
-def test_any_trial_can_be_watched_and_the_search_in_turn(browser):
+def test_any_trial_can_be_watched(browser):
     first = by_id(browser, "trial").get_attribute("value")
     by_id(browser, "previous" if first != "1" else "next").click()
     other = by_id(browser, "trial").get_attribute("value")
     assert other != first
     marked = browser.execute_script("const d = document.getElementById('convergence').data; return d.at(-1).x[0]")
     assert str(marked) == other  # a serial run tells its trials in the order of asking
+    by_id(browser, "best").click()
+    assert by_id(browser, "trial").get_attribute("value") == str(
+        browser.execute_script("return JSON.parse(document.getElementById('data').textContent).best")
+    )
+
+
+@pytest.mark.slow
+def test_the_search_can_be_watched_in_turn(browser):
     by_id(browser, "trial").send_keys("1")
     until(lambda: by_id(browser, "trial").get_attribute("value") == "1")
     by_id(browser, "onward").click()
@@ -190,10 +199,6 @@ def test_any_trial_can_be_watched_and_the_search_in_turn(browser):
     by_id(browser, "play").click()
     until(lambda: by_id(browser, "trial").get_attribute("value") == "2")
     by_id(browser, "play").click()
-    by_id(browser, "best").click()
-    assert by_id(browser, "trial").get_attribute("value") == str(
-        browser.execute_script("return JSON.parse(document.getElementById('data').textContent).best")
-    )
 
 
 def test_a_trial_is_chosen_in_the_plot_of_the_search(browser):

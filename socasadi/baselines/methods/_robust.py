@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_continuous_are
-from scipy.signal import cont2discrete
 
 from ...campaign import Pilot
 from ...model import Entry, StateSpace, subspace
@@ -90,6 +89,8 @@ def _in_tustins_variable(model: StateSpace, inverse: np.ndarray, time: float) ->
 
 
 def _sampled(system: StateSpace, time: float) -> StateSpace:
+    from scipy.signal import cont2discrete  # takes its time to import
+
     matrices: Any = cont2discrete(tuple(system), time, "bilinear")
     return StateSpace(*matrices[:4])
 
