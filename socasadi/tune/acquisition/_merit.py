@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erfcx, log_ndtr, logsumexp, softmax
+from scipy.special import erfcx, log_ndtr, logsumexp
 
 from ..surrogate import Posterior
 from ._improvement import Acquisition
@@ -87,10 +87,23 @@ class Merit:
             return chance, by_chance
         mean, std, by_mean, by_std = self.cost.predict_with_gradient(x)
         values, of_mean, of_std = self.acquisition.function(mean, np.full(len(mean), std), self.best)
-        logarithm = self.acquisition.logarithm
-        weights = softmax(values) if logarithm else np.full(len(values), 1.0 / len(values))
+        value, weights = (_log_mean_exp if self.acquisition.logarithm else _mean)(values)
         slope = (weights * of_mean) @ by_mean + float(weights @ of_std) * by_std
-        if logarithm:
-            return float(logsumexp(values) - np.log(len(values))) + chance, slope + by_chance
-        value, probability = float(values.mean()), float(np.exp(chance))
+        if self.acquisition.logarithm:
+            return value + chance, slope + by_chance
+        probability = float(np.exp(chance))
         return value * probability, probability * (slope + value * by_chance)
+
+
+def _mean(values: NDArray) -> tuple[float, NDArray]:
+    return float(values.mean()), np.full(len(values), 1.0 / len(values))
+
+
+def _log_mean_exp(values: NDArray) -> tuple[float, NDArray]:
+    """Of values (w,), with its gradient (w,): logsumexp and softmax, which take eight times as long on a few."""
+    highest = values.max()
+    each = np.exp(values - highest)
+    at_top = values == highest
+    top = at_top.sum()
+    beyond = np.log1p(np.where(at_top, 0.0, each).sum() / top)
+    return float(beyond + np.log(top) + highest - np.log(len(values))), each / each.sum()
