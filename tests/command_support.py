@@ -11,10 +11,13 @@ from unittest import mock
 from socasadi import cli
 
 
-def socasadi(*arguments, cwd, **environment):
-    """The command; in this process, which has imported all that it needs, unless the environment is to differ."""
+def socasadi(*arguments, cwd, alone=False, **environment):
+    """The command; in this process, which has imported all that it needs, unless the environment is to differ.
+
+    Alone it has a process of its own, and what its workers complain of is in ``stderr``, too.
+    """
     command = [sys.executable, "-m", "socasadi.cli", *map(str, arguments)]
-    if environment:
+    if alone or environment:
         return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env={**os.environ, **environment})
     said, complained, code = io.StringIO(), io.StringIO(), 0
     with (

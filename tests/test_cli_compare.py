@@ -27,8 +27,8 @@ comparison = Comparison(
 ROOT = Path(__file__).parents[1]
 
 
-def compare(*arguments, cwd):
-    return socasadi("compare", *arguments, cwd=cwd)
+def compare(*arguments, cwd, alone=False):
+    return socasadi("compare", *arguments, cwd=cwd, alone=alone)
 
 
 WHOLE = load_comparison(ROOT / "studies" / "compare.py", "smoke")
@@ -42,7 +42,8 @@ def smoke(request, tmp_path_factory):
     """Where it was flown, what of it, and how the command ended."""
     folder, (tasks, methods) = tmp_path_factory.mktemp("compare"), request.param
     only = [f"--{kind}={name}" for kind, names in (("task", tasks), ("method", methods)) for name in names]
-    return folder, request.param, compare(ROOT / "studies" / "compare.py", "--smoke", "--jobs=1", *only, cwd=folder)
+    done = compare(ROOT / "studies" / "compare.py", "--smoke", "--jobs=1", *only, cwd=folder, alone=True)
+    return folder, request.param, done
 
 
 pytestmark = pytest.mark.skipif(c_compiler() is None, reason="some methods are solved in C")

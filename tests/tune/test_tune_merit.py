@@ -51,6 +51,16 @@ def test_gradient_of_the_merit_is_that_of_its_value(acquisition, worlds, kernel,
         np.testing.assert_allclose(gradient, expected, rtol=1e-4, atol=1e-6 * max(1.0, np.abs(expected).max()))
 
 
+def test_worlds_that_are_alike_count_as_one():
+    one, log_ei = process(1), acquisition_named("log_ei")
+    alike = replace(one, alpha=np.tile(one.alpha, (1, 5)))
+    for x in np.random.default_rng(4).random((6, D)):
+        value, gradient = Merit(log_ei, one, np.zeros(1)).with_gradient(x)
+        same, slope = Merit(log_ei, alike, np.zeros(5)).with_gradient(x)
+        assert same == pytest.approx(value, rel=1e-12)
+        np.testing.assert_allclose(slope, gradient, rtol=1e-9)
+
+
 def test_gradient_of_the_probability_alone_is_that_of_its_value():
     merit = Merit(acquisition_named("log_ei"), None, np.zeros(1), [Constraint(process(2), 0.4), Constraint(process(3))])
     for x in np.random.default_rng(4).random((6, D)):

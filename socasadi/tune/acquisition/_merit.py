@@ -100,7 +100,7 @@ def _mean(values: NDArray) -> tuple[float, NDArray]:
 
 
 def _log_mean_exp(values: NDArray) -> tuple[float, NDArray]:
-    """Of values (w,), with its gradient (w,): logsumexp and softmax, which take eight times as long on a few."""
+    """Of values (w,), with its gradient (w,); SciPy's logsumexp and softmax are made for many, and slow on so few."""
     highest = values.max()
     each = np.exp(values - highest)
     at_top = values == highest
