@@ -63,6 +63,32 @@ def test_what_breaks_off_costs_what_it_flew_and_counts_as_failed():
     assert lab.spent < 1.0
 
 
+def test_flights_are_records_unless_they_fail_and_their_noise_does_not_come_again():
+    class Moody(LinearPlant):
+        """Its second flight breaks off."""
+
+        flights = 0
+
+        def reset(self, tip=None, *, seed=None, tension_bounds=(-np.inf, np.inf)):
+            type(self).flights += 1
+            seeds.append(seed)
+            return super().reset(tip, seed=seed)
+
+        def step(self, tension, tip_force=None):
+            if self.flights == 2:
+                raise RuntimeError("a cable tore")
+            return super().step(tension)
+
+    seeds = []
+    lab = Lab(study(Moody(noise=1e-3)), (60.0,))
+    records = lab.records(lab.study.mpc.controller(THETA), 3)
+    assert [len(record.tension) for record in records] == [120, 120]
+    assert (lab.flights, lab.failed) == (3, 1)
+    with pytest.raises(BudgetSpent):
+        list(ModelSearch().offers(lab))
+    assert len(set(seeds)) == len(seeds) > 8
+
+
 def test_the_search_of_a_model_is_the_campaign_itself(tmp_path):
     """The same points, flown under the same noise, cut at the same sample, as Study.run has them."""
     made = study(LinearPlant(noise=1e-3))

@@ -5,14 +5,14 @@ import pytest
 
 from socasadi import Fixed, LinearMPC, Modal
 from socasadi.campaign.store import describe, rebuild
-from socasadi.model import Record, StateSpace, identify, prediction_error, subspace
+from socasadi.model import Record, StateSpace, identify, prediction_error, state_space_error, subspace
 
 THETA = np.array([4.4, 0.1, 0.0056, -0.0028, -0.0028, 4.7, 0.08, 0.0, 0.0049, -0.0049])
 SYSTEM = Modal().state_space(THETA, 0.05)
 
 
-def record(samples, noise=0.0, hold=10):
-    rng = np.random.default_rng(0)
+def record(samples, noise=0.0, hold=10, seed=0):
+    rng = np.random.default_rng(seed)
     u = np.repeat(rng.uniform(-5, 5, (samples // hold, 3)), hold, axis=0)
     x, y = np.zeros(4), [np.zeros(2)]
     for row in u:
@@ -59,6 +59,49 @@ def test_the_gain_at_rest_of_a_noisy_record_is_right_to_a_hundredth():
     found = subspace(record(800, noise=1e-3, hold=20))
     theirs, true = (m.C @ np.linalg.solve(np.eye(len(m.A)) - m.A, m.B) for m in (found, SYSTEM))
     np.testing.assert_allclose(theirs, true, atol=0.01 * np.abs(true).max())
+
+
+def softer(samples, by):
+    """A record of a robot with other gains."""
+    given = record(samples, noise=1e-4, seed=1)
+    return Record(given.sample_time, given.tension, by * given.output)
+
+
+def test_fitted_to_flights_a_model_is_the_least_off_of_all_with_its_poles():
+    """Over all records together; the first record alone is then predicted a little worse."""
+
+    def off(model, *records):
+        return np.sqrt(sum(len(r.tension) * state_space_error(model, r) ** 2 for r in records))
+
+    probed, flights = record(600, noise=1e-4), [softer(200, 1.1), softer(300, 1.1)]
+    alone, both = subspace(probed), subspace(probed, flights=flights)
+    for name in "ACD":
+        np.testing.assert_array_equal(getattr(alone, name), getattr(both, name), err_msg=name)
+    assert off(both, probed, *flights) < off(alone, probed, *flights)
+    assert off(alone, probed) < off(both, probed)
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        other = both._replace(B=both.B + 1e-3 * np.abs(both.B).max() * rng.standard_normal(both.B.shape))
+        assert off(other, probed, *flights) > off(both, probed, *flights)
+
+
+def test_where_a_flight_starts_is_no_matter():
+    """The robot's linear response is that of a record whose start is cut off."""
+    whole = record(600, noise=1e-6, seed=1)
+    cut = Record(whole.sample_time, whole.tension[37:], whole.output[37:])
+    model = subspace(record(600, noise=1e-6), flights=[cut])
+    assert state_space_error(model, whole) < 1e-5
+
+
+def test_a_flight_of_another_robot_is_refused():
+    other = record(200)
+    for wrong, told in (
+        (Record(0.1, other.tension, other.output), "sample_time of flight 1 is 0.1, but 0.05 of the record"),
+        (Record(0.05, other.tension[:, :2], other.output), "inputs of flight 1 is 2, but 3 of the record"),
+        (Record(0.05, other.tension, other.output[:, :1]), "outputs of flight 1 is 1, but 2 of the record"),
+    ):
+        with pytest.raises(ValueError, match=told):
+            subspace(record(600), flights=[other, wrong])
 
 
 def test_a_record_that_is_too_short_is_told_so():

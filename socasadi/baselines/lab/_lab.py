@@ -100,6 +100,17 @@ class Lab:
         self.failed += episode.failure is not None
         return episode
 
+    def records(self, pilot: Pilot, flights: int) -> list[Record]:
+        """What so many flights of a controller tell of the robot; nothing of those that fail.
+
+        Raises
+        ------
+        BudgetSpent
+            There is not time for all.
+        """
+        episodes = [self.fly(pilot) for _ in range(flights)]
+        return [episode.record for episode in episodes if episode.failure is None]
+
     def cost(self, episode: Episode) -> float | None:
         """J of a flight; None when it failed or was cut."""
         if episode.failure is not None or episode.cut is not None:

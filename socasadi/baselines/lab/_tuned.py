@@ -14,6 +14,12 @@ from ...plant import Plant
 from ...tune import Optimizer, RandomSearch, Search, SobolSearch, Space
 from ._lab import Lab
 
+SETTINGS = ("R", ("input_noise", 1e-4, 100.0), ("disturbance_noise", 1e-4, 100.0))
+"""What is tuned of an MPC beside its model: the effort, and what the observer assumes, from "the model is right" on.
+
+Of Q and R only the quotient matters, and of the sensor's noise and the others.
+"""
+
 _WITHOUT_FLIGHT = 1000
 """Thetas in a row that give no controller, after which a search is over."""
 
@@ -71,9 +77,10 @@ def tuned(
         The lab's time is over before the search is.
     """
     study, search, in_vain = lab.study, search_for(kind, Space(knobs), lab.study, initial), 0
+    before = lab.flights
     plants = [None, *(other(study.plant) for other in over)]
     while in_vain < _WITHOUT_FLIGHT and len(search.trials) < most:
-        theta, number = search.ask(), len(search.trials) + 1
+        theta, number = search.ask(), before + len(search.trials) + 1
         try:
             pilot = build(theta)
         except DesignError:

@@ -38,7 +38,7 @@ class IterativeLearning(Method):
         mu at first.
     """
 
-    base: Method = field(default_factory=lambda: WeightSearch("subspace", most=30))
+    base: Method = field(default_factory=lambda: WeightSearch(flights=3, most=30))
     flights: int = 3
     caution: float = 3.0
 

@@ -12,7 +12,7 @@ from ...model import Fixed
 from ...mpc import LinearMPC
 from ...plant import SimulatedPlant
 from ...rod import Strain
-from ..lab import Forecast, Information, Lab, Law, Method, Program, looked_ahead, tuned
+from ..lab import SETTINGS, Forecast, Information, Lab, Law, Method, Program, looked_ahead, tuned
 from ._fixed import known_rod, linearised
 from ._sampled import sampled
 
@@ -45,7 +45,7 @@ class NonlinearMPC(Method):
 
     model: Literal["rod", "constant curvature"] = "rod"
     horizon: int = 20
-    tuned: tuple = ("R", ("input_noise", 1e-4, 100.0), ("disturbance_noise", 1e-4, 100.0))
+    tuned: tuple = SETTINGS
     doubt: float = 0.01
     trials: int = 60
 

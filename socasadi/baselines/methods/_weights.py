@@ -3,9 +3,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from ...campaign import Pilot
-from ...model import Fixed, subspace
+from ...model import Fixed, StateSpace, subspace
 from ...plant import Plant
-from ..lab import Information, Lab, Method, identified, tuned
+from ..lab import SETTINGS, Information, Lab, Method, tuned
 from ._fixed import linearised
 
 
@@ -14,49 +14,67 @@ class WeightSearch(Method):
     """A model is identified once, and what the study's MPC assumes and weighs is tuned by flights.
 
     Neumann-Brosig, Marco, Schwarzmann, Trimpe, "Data-efficient autotuning with Bayesian optimization: an industrial
-    control study", IEEE Trans. Control Systems Technology 28(3), 2020 (arXiv 1812.06325), for an MPC.
+    control study", IEEE Trans. Control Systems Technology 28(3), 2020 (arXiv 1812.06325), for an MPC. Beyond the paper
+    the model may be fitted to a few flights of the untuned controller, too: identification for control, where what
+    matters is how the robot answers along the task (Gevers, "Identification for control: from the early achievements to
+    the revival of experiment design", European J. Control 11, 2005).
 
     Parameters
     ----------
     model
-        ``"family"``, the member of the study's family that predicts a probing record best; ``"subspace"``, see
-        :func:`socasadi.model.subspace`; ``"linearised"``, the rod that is known about rest, without a record.
+        ``"subspace"``, from a probing record, see :func:`socasadi.model.subspace`; ``"linearised"``, the rod that is
+        known about rest, without a record.
     probing
         s of probing.
+    flights
+        Of the untuned controller, to whose records the model from the probing record is fitted as well.
     kind
         ``"bayesian"``; ``"sobol"`` and ``"random"`` are points that learn nothing.
     tuned
-        Settings that theta holds, as of :class:`LinearMPC`. Of Q and R only the quotient matters, and of the sensor's
-        noise and the others.
+        Settings that theta holds, as of :class:`LinearMPC`.
     over, by
         Other robots on which every controller is flown beside the study's, and whether the mean or the worst J counts:
         a search for robustness, whose flights cost as many times the robot's time.
     most
         Trials, at most; None: as many as there is time for.
+
+    Raises
+    ------
+    ValueError
+        The linearised rod is to be fitted to flights: without a probing record these do not tell all of its gains.
     """
 
-    model: Literal["family", "subspace", "linearised"] = "family"
+    model: Literal["subspace", "linearised"] = "subspace"
     probing: float = 40.0
+    flights: int = 0
     kind: Literal["bayesian", "sobol", "random"] = "bayesian"
-    tuned: tuple = ("R", "input_noise", "disturbance_noise")
+    tuned: tuple = SETTINGS
     over: tuple[Callable[[Plant], Plant], ...] = ()
     by: Literal["mean", "worst"] = "mean"
     most: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.model not in ("subspace", "linearised"):
+            raise ValueError(f"unknown model {self.model!r}; there are subspace, linearised")
+        if self.model == "linearised" and self.flights:
+            raise ValueError(f"flights={self.flights} has a probed model fitted to flights, not the linearised rod: 0")
 
     @property
     def information(self) -> Information:
         return "plant model" if self.model == "linearised" else "other robots" if self.over else "data sheet"
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
-        match self.model:
-            case "family":
-                model = identified(lab, self.probing)
-            case "subspace":
-                model = subspace(lab.probe(self.probing))
-            case "linearised":
-                model = linearised(lab)
-            case _:
-                raise ValueError(f"unknown model {self.model!r}; there are family, subspace, linearised")
+        if self.model == "linearised":
+            model = linearised(lab)
+        else:
+            record = lab.probe(self.probing)
+            model = subspace(record)
+            yield (untuned := lab.study.mpc.controller_for(model))
+            if self.flights:
+                model = subspace(record, flights=lab.records(untuned, self.flights))
+        yield from self._tuned(lab, model)
+
+    def _tuned(self, lab: Lab, model: StateSpace) -> Iterator[Pilot]:
         mpc = lab.study.mpc
         searched = replace(mpc, model=Fixed.of(model, mpc.sample_time), tuned=self.tuned)
         return tuned(
