@@ -16,7 +16,8 @@ _COLOURS = (ORANGE, "#009E73", "#CC79A7", "#56B4E9", "#E69F00", BLACK, GREY)
 _DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)))
 _MARKERS = "sD^vPX*"
 _HIGHEST = 3.0
-"""Times the least, above which values stand on the edge."""
+_HIGHEST_RMSE = 100.0
+"""Times the least, above which values stand on the edge; of RMSE they spread over decades."""
 
 
 def comparison_figures(summary: Summary, comparison: Comparison, size: Size) -> dict[str, Figure]:
@@ -37,8 +38,8 @@ def comparison_figures(summary: Summary, comparison: Comparison, size: Size) -> 
     factor, unit = Units.of(comparison.study.plant).shown
     with matplotlib.rc_context(SETTINGS):
         drawn = {
-            "cost": _over_time(summary, comparison, "J", 1.0, "J", note),
-            "rmse": _over_time(summary, comparison, "rmse", factor, f"RMSE after 5 s / {unit}", note),
+            "cost": _over_time(summary, comparison, "J", 1.0, "J", _HIGHEST, note),
+            "rmse": _over_time(summary, comparison, "rmse", factor, f"RMSE after 5 s / {unit}", _HIGHEST_RMSE, note),
             "methods": _methods(summary, note),
             "paths": _paths(summary, comparison, factor, unit, note),
         }
@@ -73,7 +74,9 @@ def _grid(summary: Summary, note: str, row: float, below: float) -> tuple[Figure
     return figure, axes
 
 
-def _over_time(summary: Summary, comparison: Comparison, name: str, factor: float, label: str, note: str) -> Figure:
+def _over_time(
+    summary: Summary, comparison: Comparison, name: str, factor: float, label: str, highest: float, note: str
+) -> Figure:
     figure, axes = _grid(summary, note, 50, 12 + 5.2 * -(-len(summary.methods) // 5))
     for place, task in zip(axes, summary.tasks, strict=False):
         duration = comparison.of(task, 0).task.duration
@@ -84,10 +87,11 @@ def _over_time(summary: Summary, comparison: Comparison, name: str, factor: floa
             if summary.of_pair(task, method)
         }
         known = np.concatenate([rows[:, 1] for rows in quartiles.values()])
-        least = float(known[np.isfinite(known)].min(initial=np.inf))
-        if not np.isfinite(least):
+        known = known[np.isfinite(known)]
+        if not known.size:
             continue
-        top = _HIGHEST * least
+        least = float(known.min())
+        top = min(highest * least, 1.05 * float(known.max()))
         for method, rows in quartiles.items():
             there = np.isfinite(rows[:, 1])
             low, middle, high = np.minimum(rows[there], top).T
@@ -98,7 +102,8 @@ def _over_time(summary: Summary, comparison: Comparison, name: str, factor: floa
             else:
                 place.vlines(time[there], low, high, color=_look(summary, method)["color"], lw=0.4)
         place.set(xscale="log", yscale="log", ylim=(0.95 * least, top))
-        for axis, parts in ((place.xaxis, (1, 2, 5)), (place.yaxis, (1, 1.5, 2, 3, 5, 7))):
+        ticks = (1, 1.5, 2, 3, 5, 7) if top < 10 * least else (1, 3)
+        for axis, parts in ((place.xaxis, (1, 2, 5)), (place.yaxis, ticks)):
             _plain_log(axis, parts)
     for place in axes[:: min(3, len(summary.tasks))]:
         place.set_ylabel(label)
