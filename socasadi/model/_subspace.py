@@ -1,4 +1,4 @@
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -13,7 +13,7 @@ _HELD_OUT = 0.3
 """Share of the record, its end, on which orders are compared."""
 
 
-def subspace(record: Record, order: int | None = None, *, flights: Sequence[Record] = ()) -> StateSpace:
+def subspace(record: Record, order: int | None = None, *, flights: Iterable[Record] = ()) -> StateSpace:
     """The stable model that N4SID finds in a record.
 
     Van Overschee, De Moor, "N4SID: subspace algorithms for the identification of combined deterministic-stochastic
@@ -31,7 +31,8 @@ def subspace(record: Record, order: int | None = None, *, flights: Sequence[Reco
         predicts the rest best.
     flights
         Further records, such as of a few flights with the controller that the model alone has given: B is fitted to
-        them as well, so that the model's gains are those of the motion that is wanted.
+        them as well, so that the model's gains are those of the motion that is wanted. Nothing but the inputs may have
+        moved the robot: no pulse, no hand.
 
     Raises
     ------
@@ -43,6 +44,7 @@ def subspace(record: Record, order: int | None = None, *, flights: Sequence[Reco
     least = 4 * _WINDOW + max(_ORDERS)
     if len(record.tension) < least / (1 - _HELD_OUT):
         raise ValueError(f"the record has {len(record.tension)} samples; {least / (1 - _HELD_OUT):.0f} are needed")
+    flights = list(flights)
     for number, flight in enumerate(flights):
         _check_alike(record, flight, number)
     chosen = _best_order(record) if order is None else order
@@ -56,7 +58,7 @@ def _check_alike(record: Record, flight: Record, number: int) -> None:
         ("outputs", record.output.shape[1], flight.output.shape[1]),
         ("sample_time", record.sample_time, flight.sample_time),
     ):
-        if ours != theirs:
+        if not np.isclose(ours, theirs, rtol=1e-9):
             raise ValueError(f"{name} of flight {number} is {theirs}, but {ours} of the record: records of one robot")
 
 

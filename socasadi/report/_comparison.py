@@ -16,8 +16,9 @@ _COLOURS = (ORANGE, "#009E73", "#CC79A7", "#56B4E9", "#E69F00", BLACK, GREY)
 _DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)))
 _MARKERS = "sD^vPX*"
 _HIGHEST = 3.0
+"""Times the least J, above which values stand on the edge."""
 _HIGHEST_RMSE = 100.0
-"""Times the least, above which values stand on the edge; of RMSE they spread over decades."""
+"""The same of RMSE, which spreads over decades."""
 
 
 def comparison_figures(summary: Summary, comparison: Comparison, size: Size) -> dict[str, Figure]:
@@ -86,12 +87,12 @@ def _over_time(
             for method in summary.methods
             if summary.of_pair(task, method)
         }
-        known = np.concatenate([rows[:, 1] for rows in quartiles.values()])
-        known = known[np.isfinite(known)]
+        known, upper = (np.concatenate([rows[:, i] for rows in quartiles.values()]) for i in (1, 2))
+        known, upper = known[np.isfinite(known)], upper[np.isfinite(upper)]
         if not known.size:
             continue
         least = float(known.min())
-        top = min(highest * least, 1.05 * float(known.max()))
+        top = min(highest * least, 1.05 * float(upper.max(initial=known.max())))
         for method, rows in quartiles.items():
             there = np.isfinite(rows[:, 1])
             low, middle, high = np.minimum(rows[there], top).T

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from baselines_support import SYSTEM, THETA, LinearPlant, study, watched
 
+from socasadi import Circle, Pulse
 from socasadi.baselines import (
     BudgetSpent,
     Forecast,
@@ -87,6 +88,24 @@ def test_flights_are_records_unless_they_fail_and_their_noise_does_not_come_agai
     with pytest.raises(BudgetSpent):
         list(ModelSearch().offers(lab))
     assert len(set(seeds)) == len(seeds) > 8
+
+
+def test_no_pulse_disturbs_what_a_model_is_fitted_to():
+    class Pushed(LinearPlant):
+        def step(self, tension, tip_force=None):
+            pushed.append(tip_force)
+            return super().step(tension)
+
+    pushed = []
+    task = Circle(radius=0.03, period=6.0, duration=6.0, pulse=Pulse(time=1.0, duration=0.5, force=(0.0, 2.0, 0.0)))
+    lab = Lab(replace(study(Pushed()), task=task), (60.0,))
+    pilot = lab.study.mpc.controller(THETA)
+    lab.fly(pilot)
+    assert any(force is not None and np.any(force) for force in pushed)
+    pushed.clear()
+    lab.records(pilot, 1)
+    assert len(pushed) == 120
+    assert not any(force is not None and np.any(force) for force in pushed)
 
 
 def test_the_search_of_a_model_is_the_campaign_itself(tmp_path):

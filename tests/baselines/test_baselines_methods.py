@@ -38,8 +38,8 @@ FEW = {
     "H-infinity": pytest.param(HInfinity(probing=8.0), 4.0, marks=pytest.mark.slow),
     "N4SID": (Subspace(probing=12.0), 1.1),
     "ILC": (IterativeLearning(WeightSearch(probing=20.0, most=3), flights=1), 1.1),
-    "Koopman": pytest.param(Koopman(probing=12.0, flights=1), 3.0, marks=compiled),
-    "DeePC": pytest.param(DeePC(probing=12.0, flights=1), 2.0, marks=compiled),
+    "Koopman": pytest.param(Koopman(probing=12.0), 3.0, marks=compiled),
+    "DeePC": pytest.param(DeePC(probing=12.0), 2.0, marks=compiled),
     "velocity DeePC": pytest.param(DeePC(velocity=True, probing=12.0), 3.0, marks=[compiled, pytest.mark.slow]),
 }
 
@@ -86,13 +86,10 @@ def test_the_most_robust_controller_of_an_integrator_is_minus_one():
 @compiled
 @pytest.mark.parametrize("effort", [1.0, 4.0])
 def test_without_noise_and_regularisation_deepc_is_the_mpc_on_the_true_model(effort):
-    """The equivalence of Coulson, Lygeros, Dörfler 2019: the plan of the data is that of the model.
-
-    Several records are as good as one (van Waarde et al. 2020): neither of these has as many samples as it takes.
-    """
+    """The equivalence of Coulson, Lygeros, Dörfler 2019: the plan of the data is that of the model."""
     made = study(output_bounds=None)
-    records = [probe(LinearPlant(), (-10, 10), duration=duration, seed=seed) for seed, duration in enumerate((2.5, 3))]
-    deepc = _deepc._Controller(DeePC(horizon=8), made.mpc, records, 6, 1e-9, 1e9, effort)
+    record = probe(LinearPlant(), (-10, 10), duration=20.0)
+    deepc = _deepc._Controller(DeePC(horizon=8), made.mpc, record, 6, 1e-9, 1e9, effort)
     plant, rng = LinearPlant(), np.random.default_rng(0)
     y = plant.reset()
     deepc.reset(0.0)
@@ -117,8 +114,7 @@ def test_without_noise_and_regularisation_deepc_is_the_mpc_on_the_true_model(eff
 
 @compiled
 def test_a_lifting_without_monomials_predicts_a_linear_robot_exactly():
-    records = [probe(LinearPlant(), (-10, 10), duration=3.0, seed=seed) for seed in (2, 3)]
-    pilot = _koopman._Controller(Koopman(degree=1), study().mpc, records, 2, 1e-12, 1.0, 1.0)
+    pilot = _koopman._Controller(Koopman(degree=1), study().mpc, probe(LinearPlant(), (-10, 10)), 2, 1e-12, 1.0, 1.0)
     assert pilot.prediction_error(probe(LinearPlant(), (-10, 10), seed=1)) < 1e-6
 
 
@@ -142,16 +138,20 @@ def test_a_model_fitted_to_flights_knows_the_motion_of_the_task_better():
     made = study(Soft(noise=1e-4), input_bounds=(-6, 6), duration=12.0)
     flight, errors = Lab(made, (12.0,)).fly(made.mpc.controller(THETA)).record, []
     for flights in (0, 3):
-        lab = Lab(made, (100.0,))
-        (*_, pilot) = WeightSearch(probing=20.0, flights=flights, most=1).offers(lab)
+        lab, offered = Lab(made, (100.0,)), []
+        offered.extend((lab.spent, pilot) for pilot in WeightSearch(probing=20.0, flights=flights, most=1).offers(lab))
+        (first, _), (_, pilot) = offered[0], offered[-1]
+        assert first == 20.0  # the untuned controller is there as soon as the record is
         assert lab.flights == flights + 1
         errors.append(state_space_error(believed(pilot), flight))
     assert errors[1] < 0.5 * errors[0]
 
 
 def test_only_a_probed_model_is_fitted_to_flights():
-    with pytest.raises(ValueError, match="flights=3 has a probed model fitted to flights, not the linearised rod"):
+    with pytest.raises(ValueError, match="flights=3: only a probed model"):
         WeightSearch("linearised", flights=3)
+    with pytest.raises(ValueError, match="flights is at least 0, not -1"):
+        WeightSearch(flights=-1)
     with pytest.raises(ValueError, match="unknown model 'family'; there are subspace, linearised"):
         WeightSearch("family")
 

@@ -61,9 +61,9 @@ def test_the_gain_at_rest_of_a_noisy_record_is_right_to_a_hundredth():
     np.testing.assert_allclose(theirs, true, atol=0.01 * np.abs(true).max())
 
 
-def softer(samples, by):
+def softer(samples, by, seed):
     """A record of a robot with other gains."""
-    given = record(samples, noise=1e-4, seed=1)
+    given = record(samples, noise=1e-4, seed=seed)
     return Record(given.sample_time, given.tension, by * given.output)
 
 
@@ -73,16 +73,23 @@ def test_fitted_to_flights_a_model_is_the_least_off_of_all_with_its_poles():
     def off(model, *records):
         return np.sqrt(sum(len(r.tension) * state_space_error(model, r) ** 2 for r in records))
 
-    probed, flights = record(600, noise=1e-4), [softer(200, 1.1), softer(300, 1.1)]
+    probed, flights = record(600, noise=1e-4), [softer(200, 1.1, seed=1), softer(300, 1.2, seed=2)]
     alone, both = subspace(probed), subspace(probed, flights=flights)
     for name in "ACD":
         np.testing.assert_array_equal(getattr(alone, name), getattr(both, name), err_msg=name)
     assert off(both, probed, *flights) < off(alone, probed, *flights)
     assert off(alone, probed) < off(both, probed)
-    rng = np.random.default_rng(0)
-    for _ in range(10):
-        other = both._replace(B=both.B + 1e-3 * np.abs(both.B).max() * rng.standard_normal(both.B.shape))
-        assert off(other, probed, *flights) > off(both, probed, *flights)
+    other = subspace(probed, flights=flights[1:])
+    for away in (both.B - alone.B, both.B - other.B):
+        for step in (-0.02, 0.02):
+            moved = both._replace(B=both.B + step * away)
+            assert off(moved, probed, *flights) > off(both, probed, *flights)
+
+
+def test_flights_may_come_one_by_one():
+    flights = [softer(200, 1.1, seed=1), softer(300, 1.2, seed=2)]
+    at_once, in_turn = subspace(record(600), flights=flights), subspace(record(600), flights=iter(flights))
+    np.testing.assert_array_equal(at_once.B, in_turn.B)
 
 
 def test_where_a_flight_starts_is_no_matter():
@@ -102,6 +109,8 @@ def test_a_flight_of_another_robot_is_refused():
     ):
         with pytest.raises(ValueError, match=told):
             subspace(record(600), flights=[other, wrong])
+    with pytest.raises(ValueError, match="inputs of flight 0 is 2"):
+        subspace(record(600), flights=[Record(0.05, other.tension[:, :2], other.output)])
 
 
 def test_a_record_that_is_too_short_is_told_so():

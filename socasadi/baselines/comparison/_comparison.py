@@ -67,7 +67,7 @@ class Comparison:
         """The comparison as it is (``"full"``), or less of it.
 
         ``"quick"``: the first three seeds, checkpoints up to 30, three flights. ``"smoke"``, whether it works at all:
-        one seed, the first two tasks for 5 s, checkpoints up to 10, one flight, one other robot.
+        one seed, the first two tasks for 5 s, checkpoints up to 20, one flight, one other robot.
         """
         match size:
             case "full":
@@ -77,7 +77,7 @@ class Comparison:
                 return replace(self, seeds=tuple(self.seeds)[:3], checkpoints=points, flights=min(self.flights, 3))
             case "smoke":
                 tasks = {name: self._short(name) for name in list(self.tasks)[:2]}
-                points = tuple(at for at in self.checkpoints if at <= 10) or tuple(self.checkpoints[:1])
+                points = tuple(at for at in self.checkpoints if at <= 20) or tuple(self.checkpoints[:1])
                 few = {"seeds": tuple(self.seeds)[:1], "checkpoints": points, "flights": 1}
                 others = dict(list(self.elsewhere.items())[:1])
                 on = tuple(name for name in self.elsewhere_on if name in tasks)

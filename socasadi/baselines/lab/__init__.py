@@ -4,10 +4,10 @@ from ._lab import BudgetSpent, Lab
 from ._law import Forecast, Law, Program, looked_ahead
 from ._method import Information, Method
 from ._models import believed, identified, static_gain
-from ._tuned import SETTINGS, tuned
+from ._tuned import BESIDE_MODEL, tuned
 
 __all__ = [
-    "SETTINGS",
+    "BESIDE_MODEL",
     "BudgetSpent",
     "Forecast",
     "Information",

@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...campaign import Episode, Pilot, Study, fly_once, probe
+from ...campaign import Episode, Pilot, Study, Task, fly_once, probe
 from ...model import Record
 from ...plant import Plant
 
@@ -74,7 +74,13 @@ class Lab:
         return record
 
     def fly(
-        self, pilot: Pilot, *, give_up: float | None = None, number: int | None = None, plant: Plant | None = None
+        self,
+        pilot: Pilot,
+        *,
+        give_up: float | None = None,
+        number: int | None = None,
+        plant: Plant | None = None,
+        task: Task | None = None,
     ) -> Episode:
         """One experiment with a controller.
 
@@ -84,17 +90,18 @@ class Lab:
             Value of J from which on it is cut; the seconds that it saves are not counted.
         number
             Of the experiment, which decides on its noise; by default how many there were, plus one.
-        plant
-            Another robot than the study's, whose time counts alike.
+        plant, task
+            Others than the study's, which take the robot's time alike.
 
         Raises
         ------
         BudgetSpent
             There is not time for a whole one.
         """
-        self._check(self.study.task.duration)
+        changed = {name: part for name, part in (("plant", plant), ("task", task)) if part is not None}
+        study = replace(self.study, **changed)
+        self._check(study.task.duration)
         self.flights += 1
-        study = self.study if plant is None else replace(self.study, plant=plant)
         episode = fly_once(study, pilot, stream=(_TRIAL, number or self.flights), give_up=give_up)
         self.spent += len(episode.tension) * episode.sample_time
         self.failed += episode.failure is not None
@@ -103,12 +110,15 @@ class Lab:
     def records(self, pilot: Pilot, flights: int) -> list[Record]:
         """What so many flights of a controller tell of the robot; nothing of those that fail.
 
+        They are flown without the task's pulse, which would be taken for an answer to the inputs.
+
         Raises
         ------
         BudgetSpent
             There is not time for all.
         """
-        episodes = [self.fly(pilot) for _ in range(flights)]
+        calm = replace(self.study.task, pulse=None)
+        episodes = [self.fly(pilot, task=calm) for _ in range(flights)]
         return [episode.record for episode in episodes if episode.failure is None]
 
     def cost(self, episode: Episode) -> float | None:

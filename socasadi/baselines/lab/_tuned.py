@@ -14,10 +14,11 @@ from ...plant import Plant
 from ...tune import Optimizer, RandomSearch, Search, SobolSearch, Space
 from ._lab import Lab
 
-SETTINGS = ("R", ("input_noise", 1e-4, 100.0), ("disturbance_noise", 1e-4, 100.0))
-"""What is tuned of an MPC beside its model: the effort, and what the observer assumes, from "the model is right" on.
+BESIDE_MODEL = ("R", ("input_noise", 1e-4, 100.0), ("disturbance_noise", 1e-4, 100.0))
+"""What of an MPC may be tuned beside its model, as of :class:`LinearMPC`: the effort, and what the observer assumes.
 
-Of Q and R only the quotient matters, and of the sensor's noise and the others.
+At the lower ends the model is all but believed. Of Q and R only the quotient matters, and of the sensor's noise and the
+others.
 """
 
 _WITHOUT_FLIGHT = 1000

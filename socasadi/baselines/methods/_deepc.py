@@ -1,4 +1,4 @@
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,48 +31,38 @@ class DeePC(Method):
         Whether the matrices hold changes from sample to sample, which leaves no steady error.
     probing
         s of probing.
-    flights
-        Of the controller that it makes of the record alone, whose records stand in the matrices as well (van Waarde, De
-        Persis, Camlibel, Tesi, "Willems' fundamental lemma for state-space systems and its extension to multiple
-        datasets", IEEE Control Systems Letters 4(3), 2020).
     horizon
         Samples that are looked ahead.
     """
 
     velocity: bool = False
     probing: float = 40.0
-    flights: int = 0
     horizon: int = 20
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
-        mpc, records, first = lab.study.mpc, [lab.probe(self.probing)], (10.0, 1.0, 1e5, 1.0)
+        mpc, record = lab.study.mpc, lab.probe(self.probing)
         knobs = (
             Entry("past", "samples", 4.0, 24.0, "log"),
             Entry("on the combination", "1", 1e-4, 1e3, "log"),
             Entry("on the past", "1/m2", 1e2, 1e8, "log"),
             Entry("effort", "1", 0.01, 100.0, "log"),
         )
-        yield (untuned := _Controller(self, mpc, records, *first))
-        records += lab.records(untuned, self.flights)
-        yield from tuned(lab, knobs, lambda x: _Controller(self, mpc, records, *x), initial=[first])
+        return tuned(lab, knobs, lambda x: _Controller(self, mpc, record, *x), initial=[(10.0, 1.0, 1e5, 1.0)])
 
 
 class _Controller(Law):
     def __init__(
-        self,
-        method: DeePC,
-        mpc: LinearMPC,
-        records: Sequence[Record],
-        past: float,
-        on_g: float,
-        on_past: float,
-        effort: float,
+        self, method: DeePC, mpc: LinearMPC, record: Record, past: float, on_g: float, on_past: float, effort: float
     ) -> None:
         super().__init__(mpc)
         m, p, past, N = mpc.inputs, mpc.outputs, round(past), method.horizon
         self._past, self._horizon, self._velocity = past, N, method.velocity
-        # With g = Q h, where Q spans the rows of the matrices, nothing grows with the length of the records.
-        matrices = np.hstack([self._matrices(record) for record in records])
+        # An output belongs to the input that was held before it.
+        u, y = record.tension / mpc.input_scale, record.output[1:]
+        if method.velocity:
+            u, y = np.diff(u, axis=0), np.diff(y, axis=0)
+        # With g = Q h, where Q spans the rows of the matrices, nothing grows with the length of the record.
+        matrices = np.vstack([_hankel(u, past + N), _hankel(y, past + N)])
         reduced = np.asarray(np.linalg.qr(matrices.T, mode="r")).T
         split = np.cumsum([past * m, N * m, past * p])
         Up, Uf, Yp, Yf = np.split(reduced, split)
@@ -112,14 +102,6 @@ class _Controller(Law):
         u, past = (np.diff(self._u, axis=0), np.diff(self._y, axis=0)) if self._velocity else (self._u[1:], self._y[1:])
         ahead = looked_ahead(reference, self._horizon)
         return self._program.inputs(np.concatenate([u, past, ahead, before, y], axis=None), self.info)[0]
-
-    def _matrices(self, record: Record) -> np.ndarray:
-        """The Hankel matrices of a record, that of the inputs on that of the outputs."""
-        # An output belongs to the input that was held before it.
-        rows = record.tension / self.mpc.input_scale, record.output[1:]
-        if self._velocity:
-            rows = (np.diff(of, axis=0) for of in rows)
-        return np.vstack([_hankel(of, self._past + self._horizon) for of in rows])
 
 
 def _hankel(rows: np.ndarray, length: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
@@ -25,8 +25,6 @@ class Koopman(Method):
     ----------
     probing
         s of probing.
-    flights
-        Of the controller that it makes of the record alone, whose records are fitted as well.
     degree
         Of the monomials of the last two samples' outputs, at most.
     horizon
@@ -34,21 +32,18 @@ class Koopman(Method):
     """
 
     probing: float = 40.0
-    flights: int = 0
     degree: int = 3
     horizon: int = 20
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
-        mpc, records, first = lab.study.mpc, [lab.probe(self.probing)], (5.0, 1e-3, 0.2, 1.0)
+        mpc, record = lab.study.mpc, lab.probe(self.probing)
         knobs = (
-            Entry("delays", "samples", 1.5, 8.5, "log"),
-            Entry("ridge", "1", 1e-6, 1e1, "log"),
-            Entry("gain of the disturbance", "1", 0.01, 1.0, "log"),
+            Entry("delays", "samples", 1.5, 40.5, "log"),
+            Entry("ridge", "1", 1e-7, 1e1, "log"),
+            Entry("gain of the disturbance", "1", 1e-4, 1.0, "log"),
             Entry("effort", "1", 0.01, 100.0, "log"),
         )
-        yield (untuned := _Controller(self, mpc, records, *first))
-        records += lab.records(untuned, self.flights)
-        yield from tuned(lab, knobs, lambda x: _Controller(self, mpc, records, *x), initial=[first])
+        return tuned(lab, knobs, lambda x: _Controller(self, mpc, record, *x), initial=[(5.0, 1e-3, 0.2, 1.0)])
 
 
 class _Controller(Law):
@@ -56,21 +51,21 @@ class _Controller(Law):
         self,
         method: Koopman,
         mpc: LinearMPC,
-        records: Sequence[Record],
+        record: Record,
         delays: float,
         ridge: float,
         gain: float,
         effort: float,
     ) -> None:
         super().__init__(mpc)
-        self._delays = round(delays)
+        self._delays = d = round(delays)
         self._method, self._gain, p, m, N = method, gain, mpc.outputs, mpc.inputs, method.horizon
-        # So that monomials are of the size of what they are made of.
-        self._unit = max(float(np.abs(record.output).max()) for record in records)
-        pairs = [self._lifted_pairs(record) for record in records]
-        known, after = (np.vstack(rows) for rows in zip(*pairs, strict=True))
-        size = after.shape[1]
-        fitted = np.linalg.solve(known.T @ known + ridge * len(known) * np.eye(known.shape[1]), known.T @ after).T
+        self._unit = float(np.abs(record.output).max())  # so that monomials are of the size of what they are made of
+        u, y = record.tension / mpc.input_scale, record.output
+        lifted = np.array([self._lift(y[t - d : t + 1][::-1], u[t - d : t][::-1]) for t in range(d, len(u) + 1)])
+        known = np.hstack([lifted[:-1], u[d:]])
+        size = lifted.shape[1]
+        fitted = np.linalg.solve(known.T @ known + ridge * len(known) * np.eye(known.shape[1]), known.T @ lifted[1:]).T
         self._A, self._B = fitted[:, :size], fitted[:, size:]
         # Outputs over the horizon: from the lifted state, from each input, and the disturbance.
         C = self._unit * np.eye(size)[:p]
@@ -116,12 +111,6 @@ class _Controller(Law):
             lifted = self._A @ lifted + self._B @ share
             outputs.append(self._unit * lifted[: self.mpc.outputs])
         return np.array(outputs)
-
-    def _lifted_pairs(self, record: Record) -> tuple[np.ndarray, np.ndarray]:
-        """Lifted states with the inputs that are then held, and the lifted states a sample later, row by row."""
-        d, u, y = self._delays, record.tension / self.mpc.input_scale, record.output
-        lifted = np.array([self._lift(y[t - d : t + 1][::-1], u[t - d : t][::-1]) for t in range(d, len(u) + 1)])
-        return np.hstack([lifted[:-1], u[d:]]), lifted[1:]
 
     def _lift(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Newest first: outputs (delays + 1, p), m, and inputs (delays, m), as shares -> the lifted state."""

@@ -12,7 +12,7 @@ from ...model import Fixed
 from ...mpc import LinearMPC
 from ...plant import SimulatedPlant
 from ...rod import Strain
-from ..lab import SETTINGS, Forecast, Information, Lab, Law, Method, Program, looked_ahead, tuned
+from ..lab import BESIDE_MODEL, Forecast, Information, Lab, Law, Method, Program, looked_ahead, tuned
 from ._fixed import known_rod, linearised
 from ._sampled import sampled
 
@@ -45,7 +45,7 @@ class NonlinearMPC(Method):
 
     model: Literal["rod", "constant curvature"] = "rod"
     horizon: int = 20
-    tuned: tuple = SETTINGS
+    tuned: tuple = BESIDE_MODEL
     doubt: float = 0.01
     trials: int = 60
 

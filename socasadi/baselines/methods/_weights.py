@@ -5,7 +5,7 @@ from typing import Literal
 from ...campaign import Pilot
 from ...model import Fixed, StateSpace, subspace
 from ...plant import Plant
-from ..lab import SETTINGS, Information, Lab, Method, tuned
+from ..lab import BESIDE_MODEL, Information, Lab, Method, tuned
 from ._fixed import linearised
 
 
@@ -41,14 +41,15 @@ class WeightSearch(Method):
     Raises
     ------
     ValueError
-        The linearised rod is to be fitted to flights: without a probing record these do not tell all of its gains.
+        The model is unknown, the flights are fewer than none, or the linearised rod is to be fitted to them: without a
+        probing record they do not tell all gains.
     """
 
     model: Literal["subspace", "linearised"] = "subspace"
     probing: float = 40.0
     flights: int = 0
     kind: Literal["bayesian", "sobol", "random"] = "bayesian"
-    tuned: tuple = SETTINGS
+    tuned: tuple = BESIDE_MODEL
     over: tuple[Callable[[Plant], Plant], ...] = ()
     by: Literal["mean", "worst"] = "mean"
     most: int | None = None
@@ -56,8 +57,12 @@ class WeightSearch(Method):
     def __post_init__(self) -> None:
         if self.model not in ("subspace", "linearised"):
             raise ValueError(f"unknown model {self.model!r}; there are subspace, linearised")
-        if self.model == "linearised" and self.flights:
-            raise ValueError(f"flights={self.flights} has a probed model fitted to flights, not the linearised rod: 0")
+        if self.flights < 0:
+            raise ValueError(f"flights is at least 0, not {self.flights}")
+        if self.flights and self.model == "linearised":
+            raise ValueError(
+                f"flights={self.flights}: the linearised rod takes 0, only a probed model is fitted to them"
+            )
 
     @property
     def information(self) -> Information:
