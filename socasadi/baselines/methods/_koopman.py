@@ -25,6 +25,8 @@ class Koopman(Method):
     ----------
     probing
         s of probing.
+    delays
+        Samples that are lifted, at most.
     degree
         Of the monomials of the last two samples' outputs, at most.
     horizon
@@ -32,13 +34,14 @@ class Koopman(Method):
     """
 
     probing: float = 40.0
+    delays: int = 40
     degree: int = 3
     horizon: int = 20
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         mpc, record = lab.study.mpc, lab.probe(self.probing)
         knobs = (
-            Entry("delays", "samples", 1.5, 40.5, "log"),
+            Entry("delays", "samples", 1.5, self.delays + 0.5, "log"),
             Entry("ridge", "1", 1e-7, 1e1, "log"),
             Entry("gain of the disturbance", "1", 1e-4, 1.0, "log"),
             Entry("effort", "1", 0.01, 100.0, "log"),
