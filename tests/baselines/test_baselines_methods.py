@@ -148,7 +148,7 @@ def test_a_model_fitted_to_flights_knows_the_motion_of_the_task_better():
 
 
 def test_only_a_probed_model_is_fitted_to_flights():
-    with pytest.raises(ValueError, match="flights=3: only a probed model"):
+    with pytest.raises(ValueError, match="flights=3: the linearised rod takes 0"):
         WeightSearch("linearised", flights=3)
     with pytest.raises(ValueError, match="flights is at least 0, not -1"):
         WeightSearch(flights=-1)
