@@ -1,6 +1,7 @@
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from ._base import StateSpace
 from ._identify import state_space_error
@@ -47,9 +48,10 @@ def subspace(record: Record, order: int | None = None, *, flights: Iterable[Reco
     flights = list(flights)
     for number, flight in enumerate(flights):
         _check_alike(record, flight, number)
-    chosen = _best_order(record) if order is None else order
-    A, B, C, D = _n4sid(record, chosen)
-    return StateSpace(A, _input_matrix(A, C, [record, *flights]) if flights else B, C, D)
+    with threadpool_limits(1):  # its matrices are small: threads would wait for each other
+        chosen = _best_order(record) if order is None else order
+        A, B, C, D = _n4sid(record, chosen)
+        return StateSpace(A, _input_matrix(A, C, [record, *flights]) if flights else B, C, D)
 
 
 def _check_alike(record: Record, flight: Record, number: int) -> None:
