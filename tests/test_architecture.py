@@ -30,7 +30,7 @@ LIBRARIES = {
     "campaign": {"distributed"},
     "codegen": {"platformdirs"},
     "export": {"jinja2"},
-    "model": {"sippy_unipi"},
+    "model": {"sippy_unipi", "threadpoolctl"},
     "report": {"PIL", "imageio_ffmpeg", "jinja2", "plotly"},
     "tune": {"threadpoolctl"},
 }
