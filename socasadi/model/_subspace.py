@@ -49,9 +49,7 @@ def subspace(record: Record, order: int | None = None, *, flights: Iterable[Reco
     for number, flight in enumerate(flights):
         _check_alike(record, flight, number)
     with threadpool_limits(1):  # its matrices are small: threads would wait for each other
-        chosen = _best_order(record) if order is None else order
-        A, B, C, D = _n4sid(record, chosen)
-        return StateSpace(A, _input_matrix(A, C, [record, *flights]) if flights else B, C, D)
+        return _n4sid(record, _best_order(record) if order is None else order, flights)
 
 
 def _check_alike(record: Record, flight: Record, number: int) -> None:
@@ -71,7 +69,7 @@ def _best_order(record: Record) -> int:
     return min(_ORDERS, key=lambda order: state_space_error(_n4sid(first, order), last))
 
 
-def _n4sid(record: Record, order: int) -> StateSpace:
+def _n4sid(record: Record, order: int, flights: Sequence[Record] = ()) -> StateSpace:
     try:
         import sippy_unipi  # an extra, which takes its time
     except ModuleNotFoundError as error:
@@ -89,7 +87,7 @@ def _n4sid(record: Record, order: int) -> StateSpace:
         SS_A_stability=True,
     )
     A, C = (np.asarray(getattr(found, name), dtype=float) for name in "AC")
-    return StateSpace(A, _input_matrix(A, C, [record]), C, np.zeros((len(C), record.tension.shape[1])))
+    return StateSpace(A, _input_matrix(A, C, [record, *flights]), C, np.zeros((len(C), record.tension.shape[1])))
 
 
 def _input_matrix(A: np.ndarray, C: np.ndarray, records: Sequence[Record]) -> np.ndarray:
