@@ -28,6 +28,7 @@ from .comparison import (
     worth_elsewhere,
 )
 from .lab import (
+    Allocation,
     BudgetSpent,
     Forecast,
     Information,
@@ -56,6 +57,7 @@ from .methods import (
 
 __all__ = [
     "PID",
+    "Allocation",
     "BudgetSpent",
     "Comparison",
     "DeadCable",

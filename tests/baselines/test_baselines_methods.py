@@ -20,9 +20,9 @@ from socasadi.baselines import (
     WeightSearch,
     worth,
 )
-from socasadi.baselines.lab import believed
+from socasadi.baselines.lab import Allocation, believed, static_gain
 from socasadi.baselines.methods import _deepc, _koopman
-from socasadi.baselines.methods._robust import _most_robust
+from socasadi.baselines.methods._robust import _in_tustins_variable, _most_robust
 from socasadi.baselines.methods._sampled import sampled
 from socasadi.campaign import probe
 from socasadi.codegen import c_compiler
@@ -56,17 +56,90 @@ def test_a_hundred_seconds_with_the_arm_give_a_controller_that_follows_the_circl
     assert path.shape == (121, 2)
 
 
+@pytest.mark.parametrize(
+    ("bounds", "target"),
+    [
+        ((-10, 10), (0.02, -0.01)),
+        ((0, 20), (0.03, 0.01)),  # what the pseudoinverse of the gains asks for would push
+        ((-10, 10), (0.09, 0.0)),  # one cable at its bound, the others take its share
+    ],
+)
 @pytest.mark.parametrize("method", [PID(10.0), HInfinity(10.0)])
-def test_integral_action_leaves_no_steady_error(method):
-    made = study(LinearPlant())
+def test_integral_action_leaves_no_steady_error_wherever_the_bounds_let_it_come(method, bounds, target):
+    made = study(LinearPlant(), input_bounds=bounds)
     lab = Lab(made, (64.0,))
     pilot = method.controller(lab)
-    plant, wanted = LinearPlant(), np.array([[0.02, -0.01]])
+    pilot._allocation = Allocation(0.9 * pilot._allocation.gain)  # the robot's is another than it was
+    plant, wanted = LinearPlant(), np.array([target])
     pilot.reset(0.0)
     y = plant.reset()
     for _ in range(2000):
         y = plant.step(pilot.step(y, wanted))
     np.testing.assert_allclose(y, wanted[0], atol=1e-4)  # an integrator of the loop shaping is one above 1e-3 rad/s
+
+
+@pytest.mark.parametrize("method", [PID(10.0), HInfinity(10.0)])
+def test_what_bounds_keep_out_of_reach_does_not_wind_up(method):
+    """From a target at thrice the reach to one within takes little longer than from the end of the reach.
+
+    What 20 s of an error of 0.2 m would have summed up takes a minute to undo.
+    """
+    made = study(LinearPlant())
+    pilot, wanted = method.controller(Lab(made, (64.0,))), np.array([[0.03, 0.01]])
+    settled = []
+    for far in (0.09, 0.3):
+        plant = LinearPlant()
+        pilot.reset(0.0)
+        y = plant.reset()
+        for _ in range(400):
+            y = plant.step(pilot.step(y, np.array([[far, 0.0]])))
+        errors = []
+        for _ in range(200):
+            y = plant.step(pilot.step(y, wanted))
+            errors.append(np.linalg.norm(y - wanted[0]))
+        settled.append(max(np.flatnonzero(np.array(errors) > 1e-3), default=0))
+    assert settled[1] < settled[0] + 60
+
+
+def test_of_inputs_that_reach_what_is_wanted_the_smallest_within_bounds_are_taken():
+    gain, rng = static_gain(SYSTEM), np.random.default_rng(0)
+    allocation, at_bound = Allocation(gain), 0
+    for _ in range(40):
+        allowed = (rng.uniform(-10, -2, 3), rng.uniform(2, 10, 3))
+        inside = rng.uniform(*allowed)
+        u, missed = allocation.inputs(gain @ inside, allowed)
+        at_bound += np.isclose(u, allowed).any()
+        assert (u >= allowed[0]).all()
+        assert (u <= allowed[1]).all()
+        assert np.linalg.norm(u) <= np.linalg.norm(inside) * (1 + 1e-6)
+        np.testing.assert_allclose(gain @ u, gain @ inside, atol=1e-4 * np.abs(gain @ inside).max())
+        assert not missed.any()
+    assert at_bound > 3
+    u, missed = allocation.inputs(10 * gain @ inside, allowed)
+    np.testing.assert_allclose(missed, 10 * gain @ inside - gain @ u, atol=1e-12)
+    assert np.abs(missed).max() > 0.01
+
+
+@pytest.mark.parametrize("frequency", [1.0, 5.0, 20.0, 40.0])
+def test_loop_shaping_designs_for_the_response_that_the_law_meets(frequency):
+    """From u_k to the y_k that is measured before it, as of the robot under a sinusoid."""
+    time, inverse = 0.05, np.linalg.pinv(static_gain(SYSTEM))
+    plain = subspace(probe(LinearPlant(), (-10, 10), duration=20.0), 4)  # SYSTEM without D
+    plant, steps = LinearPlant(), 4000
+    wave = np.exp(1j * frequency * time * np.arange(steps))
+    measured = np.zeros((2, 2), dtype=complex)
+    for i in range(2):
+        for part, factor in ((wave.real, 1.0), (wave.imag, 1j)):
+            y, seen = plant.reset(), []
+            for value in part:
+                seen.append(y)
+                y = plant.step(inverse[:, i] * value)
+            measured[:, i] += factor * np.array(seen)[-1]
+    measured /= wave[-1]
+    designed = _in_tustins_variable(plain, inverse, time)
+    s = 2j / time * np.tan(frequency * time / 2)
+    response = designed.C @ np.linalg.solve(s * np.eye(len(designed.A)) - designed.A, designed.B) + designed.D
+    np.testing.assert_allclose(response, measured, atol=1e-3 * np.abs(measured).max())
 
 
 def test_the_most_robust_controller_of_an_integrator_is_minus_one():

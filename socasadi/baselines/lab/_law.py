@@ -41,15 +41,17 @@ class Law(ABC):
         if not np.isfinite(wanted).all():
             self.info.held += 1
             wanted = self.held
-        self.held = self.clipped(wanted)
+        self.held = np.clip(wanted, *self.allowed)
         return self.held.copy()
 
-    def clipped(self, wanted: np.ndarray) -> np.ndarray:
-        """The input (m,), N, nearest to the one wanted that the bounds and the last one allow."""
-        if self.mpc.rate_limits is not None:
-            slowest, fastest = (limit * self.mpc.sample_time for limit in self.mpc.rate_limits)
-            wanted = np.clip(wanted, self.held + slowest, self.held + fastest)
-        return np.clip(wanted, *self.mpc.input_limits)
+    @property
+    def allowed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest input (m,), N, that the bounds and the last one allow for the coming sample."""
+        lower, upper = self.mpc.input_limits
+        if self.mpc.rate_limits is None:
+            return lower, upper
+        slowest, fastest = (self.held + limit * self.mpc.sample_time for limit in self.mpc.rate_limits)
+        return np.clip(slowest, lower, upper), np.clip(fastest, lower, upper)
 
     def prediction_error(self, record: Record) -> float:
         """How far its model, if it has one, is off on a record from rest: root mean square distance, m."""

@@ -6,7 +6,7 @@ import numpy as np
 from ...campaign import Pilot
 from ...model import Entry, subspace
 from ...mpc import LinearMPC
-from ..lab import Lab, Law, Method, static_gain, tuned
+from ..lab import Allocation, Lab, Law, Method, static_gain, tuned
 
 
 @dataclass(frozen=True)
@@ -15,8 +15,8 @@ class PID(Method):
 
     .. math:: u = G^+ (f r + k_p e + k_i \int e\, dt + k_d \dot e_f)
 
-    with the error's derivative filtered. It sees the reference of the next sample, and no further. The five numbers are
-    tuned by flights.
+    with the error's derivative filtered, or the inputs within the bounds that come nearest to it at rest. It sees the
+    reference of the next sample, and no further. The five numbers are tuned by flights.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class PID(Method):
     probing: float = 40.0
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
-        inverse = np.linalg.pinv(static_gain(subspace(lab.probe(self.probing))))
+        allocation = Allocation(static_gain(subspace(lab.probe(self.probing))))
         knobs = (
             Entry("proportional", "1", 0.01, 10.0, "log"),
             Entry("integral", "1/s", 0.05, 20.0, "log"),
@@ -36,13 +36,15 @@ class PID(Method):
             Entry("fed forward", "1", 0.0, 1.0),
         )
         mpc = lab.study.mpc
-        return tuned(lab, knobs, lambda gains: _Controller(mpc, inverse, gains), initial=[(0.1, 1.0, 0.05, 0.1, 1.0)])
+        return tuned(
+            lab, knobs, lambda gains: _Controller(mpc, allocation, gains), initial=[(0.1, 1.0, 0.05, 0.1, 1.0)]
+        )
 
 
 class _Controller(Law):
-    def __init__(self, mpc: LinearMPC, inverse: np.ndarray, gains: np.ndarray) -> None:
+    def __init__(self, mpc: LinearMPC, allocation: Allocation, gains: np.ndarray) -> None:
         super().__init__(mpc)
-        self._inverse, self._gains = inverse, gains
+        self._allocation, self._gains = allocation, gains
         self.begin()
 
     def begin(self) -> None:
@@ -58,8 +60,7 @@ class _Controller(Law):
         self._error = error
         known = forward * reference[0] + proportional * error + derivative * self._slope
         summed = self._integral + time * error
-        u = self._inverse @ (known + integral * summed)
-        if (self.clipped(u) == u).all():  # at a bound the integral waits, lest it winds up
-            self._integral = summed
-            return u
-        return self._inverse @ (known + integral * self._integral)
+        u, missed = self._allocation.inputs(known + integral * summed, self.allowed)
+        # The integral of an output that bounds keep from going further waits, lest it winds up.
+        self._integral = np.where(missed * error > 0, self._integral, summed)
+        return u

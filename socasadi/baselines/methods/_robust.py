@@ -8,7 +8,7 @@ from scipy.linalg import solve_continuous_are
 from ...campaign import Pilot
 from ...model import Entry, StateSpace, subspace
 from ...mpc import DesignError, LinearMPC
-from ..lab import Lab, Law, Method, static_gain, tuned
+from ..lab import Allocation, Lab, Law, Method, static_gain, tuned
 
 _ABOVE_LEAST = 1.1
 """gamma of the controller, as a factor on the least that there is."""
@@ -18,7 +18,7 @@ _SLOW = 1e-3
 
 @dataclass(frozen=True)
 class HInfinity(Method):
-    r"""H-infinity loop shaping on an identified model, behind the inverse static Jacobian.
+    r"""H-infinity loop shaping on an identified model, behind the inverse static Jacobian (within the bounds).
 
     The plant, shaped by :math:`W = k (s + w) / s` in each channel, gets the controller that is the most robust against
     perturbations of its normalised coprime factors (McFarlane, Glover, "A loop-shaping design procedure using
@@ -36,29 +36,29 @@ class HInfinity(Method):
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         mpc, model = lab.study.mpc, subspace(lab.probe(self.probing))
-        inverse = np.linalg.pinv(static_gain(model))
+        allocation = Allocation(static_gain(model))
         knobs = (
             Entry("gain", "1", 0.03, 30.0, "log"),
             Entry("corner", "rad/s", 0.1, 30.0, "log"),
             Entry("fed forward", "1", 0.0, 1.0),
         )
-        return tuned(lab, knobs, lambda x: _Controller(mpc, model, inverse, *x), initial=[(0.3, 2.0, 1.0)])
+        return tuned(lab, knobs, lambda x: _Controller(mpc, model, allocation, *x), initial=[(0.3, 2.0, 1.0)])
 
 
 class _Controller(Law):
     """v = forward r + W (K y - K(0) r), u = inverse v, where y - forward r is what is left to do."""
 
     def __init__(
-        self, mpc: LinearMPC, model: StateSpace, inverse: np.ndarray, gain: float, corner: float, forward: float
+        self, mpc: LinearMPC, model: StateSpace, allocation: Allocation, gain: float, corner: float, forward: float
     ) -> None:
         super().__init__(mpc)
         p, one = mpc.outputs, np.eye(mpc.outputs)
         # k (s + w) / (s + slow)
         shaper = StateSpace(-_SLOW * one, one, gain * (corner - _SLOW) * one, gain * one)
-        plant = _in_tustins_variable(model, inverse, mpc.sample_time)
+        plant = _in_tustins_variable(model, allocation.inverse, mpc.sample_time)
         robust = _most_robust(_series(plant, shaper))
         self._static = robust.D - robust.C @ np.linalg.solve(robust.A, robust.B)
-        self._inverse, self._forward = inverse, forward
+        self._allocation, self._forward = allocation, forward
         self._robust, self._shaper = _sampled(robust, mpc.sample_time), _sampled(shaper, mpc.sample_time)
         self._sizes = len(robust.A), p
         self.begin()
@@ -71,21 +71,24 @@ class _Controller(Law):
         wanted = reference[0]
         left = y - self._forward * wanted
         answer = robust.C @ self._x + robust.D @ left - (1 - self._forward) * self._static @ wanted
-        u = self._inverse @ (self._forward * wanted + shaper.C @ self._integral + shaper.D @ answer)
+        v = self._forward * wanted + shaper.C @ self._integral + shaper.D @ answer
+        u, missed = self._allocation.inputs(v, self.allowed)
         self._x = robust.A @ self._x + robust.B @ left
-        if (self.clipped(u) == u).all():  # at a bound the integral waits, lest it winds up
-            self._integral = shaper.A @ self._integral + shaper.B @ answer
+        # The integral of an output that bounds keep from going further waits, lest it winds up.
+        further = shaper.A @ self._integral + shaper.B @ answer
+        self._integral = np.where(missed * answer > 0, self._integral, further)
         return u
 
 
 def _in_tustins_variable(model: StateSpace, inverse: np.ndarray, time: float) -> StateSpace:
-    """The model from wanted to measured outputs, as a system in continuous time whose Tustin image it is."""
-    A, B, C, D = model
-    # y after the step of x -> y before the next one.
-    B, C, D = B @ inverse, C @ A, (C @ B + D) @ inverse
+    """A model without D from wanted to measured outputs, as a system in continuous time whose Tustin image it is.
+
+    A law answers to what was measured before its sample: for it y_k = C x_k, where a step of the model gives y_{k+1}.
+    """
+    A, B, C = model.A, model.B @ inverse, model.C
     plus = np.linalg.inv(A + np.eye(len(A)))
     root = 2 / np.sqrt(time)
-    return StateSpace(2 / time * plus @ (A - np.eye(len(A))), root * plus @ B, root * C @ plus, D - C @ plus @ B)
+    return StateSpace(2 / time * plus @ (A - np.eye(len(A))), root * plus @ B, root * C @ plus, -C @ plus @ B)
 
 
 def _sampled(system: StateSpace, time: float) -> StateSpace:
