@@ -129,7 +129,7 @@ class Comparison:
             "schema": _SCHEMA,
             "study": self.of(task, seed).settings,
             "method": describe(self.methods[method]),
-            "own code": [own_code(part) for part in (self.methods[method], self.of(task, seed).task)],
+            "own code": [own_code(part) for part in (self.methods[method], self.of(task, seed))],
             "checkpoints": list(self.checkpoints),
             "flights": self.flights,
             "elsewhere": [(name, describe(other), own_code(other)) for name, other in self.elsewhere.items()]

@@ -1,5 +1,6 @@
 """What a run folder keeps: every trial in an SQLite journal, and every setting as plain data."""
 
+from ._code import code_names, code_text, used_values
 from ._folder import (
     RunError,
     begun,
@@ -11,7 +12,7 @@ from ._folder import (
 )
 from ._journal import Journal, JournalError
 from ._pack import pack, unpack
-from ._settings import ForeignTypeError, describe, differences, rebuild
+from ._settings import ForeignTypeError, describe, differences, parts, rebuild
 from ._trial import Asked, Flight, Outcome, Trial
 
 __all__ = [
@@ -24,14 +25,18 @@ __all__ = [
     "RunError",
     "Trial",
     "begun",
+    "code_names",
+    "code_text",
     "compare_settings",
     "describe",
     "differences",
     "journal_path",
     "pack",
+    "parts",
     "read_settings",
     "rebuild",
     "settings_path",
     "unpack",
+    "used_values",
     "write_settings",
 ]
