@@ -13,15 +13,12 @@ from ..model import identify, state_space_error
 from ..mpc import DesignError
 from ..plant import ExternalPlant
 from ._result import Result
-from .execution import flown_cost, fly_once
+from .execution import Stream, drawn_seed, flown_cost, fly_once
 from .experiment import Episode, probe
 from .store import Flight, Journal, journal_path
 
 if TYPE_CHECKING:
     from ._study import Study
-
-# Streams of random numbers beside the trials' own, which is 0.
-_VERIFICATION, _PROBE = 1, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +156,7 @@ def _probing(result: Result, journal: Journal, index: int) -> Episode:
     name = f"probe {index}"
     if name not in (known := journal.flights()):
         study = result.study
-        seed = int(np.random.SeedSequence([study.seed, _PROBE, index]).generate_state(1)[0])
+        seed = drawn_seed(study.seed, Stream.PROBE, index)
         record = probe(study.plant, study.mpc.input_bounds, seed=seed)
         nothing = np.zeros_like(record.output)
         episode = Episode(
@@ -187,7 +184,7 @@ def _verification(result: Result, journal: Journal, name: str, index: int, theta
         controller = study.mpc.controller(theta)
     except DesignError:
         return None
-    episode = fly_once(study, controller, stream=(_VERIFICATION, index))
+    episode = fly_once(study, controller, (Stream.VERIFICATION, index))
     score = study.cost.score(episode, study.mpc.input_scale) if episode.failure is None else None
     flight = Flight(name, theta, score, episode)
     journal.add_flight(flight)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from baselines_support import THETA, LinearPlant, rod_study, study
 
-from socasadi import Circle
+from socasadi import Circle, ClosedLoopStability, Overshoot, Pulse, Rod, SimulatedPlant
 from socasadi.baselines import (
     Comparison,
     DeadCable,
@@ -32,6 +32,7 @@ from socasadi.baselines import (
 )
 from socasadi.campaign import Pilot, RunError
 from socasadi.report import comparison_figures
+from socasadi.rod import Division, Material, Section, Strain
 
 SCRIPT = """
 from baselines_support import study
@@ -131,7 +132,41 @@ def test_what_is_no_controller_breaks_the_method_off_and_not_the_comparison():
             yield None  # pyright: ignore[reportReturnType]
 
     cell = fly_cell(comparison(methods={"forgetful": Forgetful()}), "circle", "forgetful", 0)
-    assert cell["broke"] == "TypeError: offers yields controllers, which have an mpc; not None"
+    assert cell["broke"] == "TypeError: offers yields controllers, which have mpc, info, reset, step; not None"
+
+
+def test_a_controller_that_is_changed_after_it_was_offered_is_not_taken_for_two():
+    @dataclass(frozen=True)
+    class Reusing(Method):
+        def offers(self, lab: Lab) -> Iterator[Pilot]:
+            pilot = lab.study.mpc.controller(THETA)
+            yield pilot
+            lab.fly(pilot)
+            yield pilot
+
+    cell = fly_cell(comparison(methods={"reusing": Reusing()}), "circle", "reusing", 0)
+    assert "the same controller twice" in cell["broke"]
+    assert cell["points"][0]["spent"] == cell["points"][-1]["spent"] == 0.0
+
+
+def test_a_controller_that_breaks_when_it_is_judged_breaks_its_method_off():
+    class Silent:
+        """It flies, but what it predicts it cannot say."""
+
+        def __init__(self, pilot):
+            self.mpc, self.info, self.reset, self.step = pilot.mpc, pilot.info, pilot.reset, pilot.step
+
+        def prediction_error(self, record):
+            raise IndexError("no such sample")
+
+    @dataclass(frozen=True)
+    class Faulty(Method):
+        def offers(self, lab: Lab) -> Iterator[Pilot]:
+            yield Silent(lab.study.mpc.controller(THETA))
+
+    cell = fly_cell(comparison(methods={"faulty": Faulty()}), "circle", "faulty", 0)
+    assert cell["broke"] == "IndexError: no such sample"
+    assert cell["points"] == [None, None, None]
 
 
 def test_a_plant_of_which_a_task_differs_is_not_known():
@@ -298,6 +333,9 @@ def test_a_size_is_less_of_the_same():
     smoke = whole.of_size("smoke")
     assert (smoke.seeds, smoke.checkpoints) == ((0,), (1, 10))
     assert smoke.of("circle", 0).task.duration == 5.0
+    late = Circle(duration=4.0, pulse=Pulse(time=3.0, duration=0.5, force=(0.0, 1.0, 0.0)))
+    short = comparison(tasks={"late": late}).of_size("smoke").of("late", 0).task
+    assert (short.duration, short.pulse) == (4.0, None)
     with pytest.raises(ValueError, match="smoke, quick, full"):
         whole.of_size("huge")
 
@@ -313,6 +351,10 @@ def test_some_of_its_parts_are_flown_by_themselves():
     with pytest.raises(ValueError, match="2 seeds, of which the first 3 cannot be taken"):
         comparison(seeds=(0, 1)).of_parts(seeds=3)
     assert some.digest("circle", "never", 0) == comparison().digest("circle", "never", 0)
+    two = {"circle": Circle(), "small": Circle(radius=0.01)}
+    robust = comparison(tasks=two, elsewhere={"dead": DeadCable()}, elsewhere_on=("circle",))
+    assert not robust.of_parts(tasks=["small"]).elsewhere
+    assert robust.of_parts(tasks=["circle"]).elsewhere == robust.elsewhere
 
 
 @pytest.mark.parametrize(
@@ -330,7 +372,13 @@ def test_some_of_its_parts_are_flown_by_themselves():
         ({"tasks": {"circle": 0.03}}, TypeError, "'circle' is a Task, not 0.03"),
         ({"tasks": {"a/b": Circle()}}, ValueError, "'a/b' gives files their names"),
         ({"elsewhere": {"dead": 3}}, TypeError, "'dead' is 3"),
-        ({"elsewhere_on": "circle"}, TypeError, "not the text 'circle'"),
+        ({"elsewhere": [DeadCable()]}, TypeError, "elsewhere is a dictionary"),
+        ({"elsewhere": {"dead": DeadCable()}}, ValueError, "elsewhere_on no task"),
+        ({"elsewhere_on": "circle"}, TypeError, "names of tasks, not 'circle'"),
+        ({"elsewhere_on": None}, TypeError, "names of tasks, not None"),
+        ({"tasks": {1: Circle()}}, ValueError, "the task 1 gives files their names"),
+        ({"study": replace(study(), conditions=(ClosedLoopStability(),))}, ValueError, "the study has conditions"),
+        ({"tasks": {"x": replace(study(), limits=(Overshoot(0.1),))}}, ValueError, "the study has limits"),
         ({"methods": {"x": Better}}, TypeError, "'x' is a Method"),
         ({"elsewhere_on": ("square",)}, ValueError, "'square'; the tasks are circle"),
     ],
@@ -338,6 +386,17 @@ def test_some_of_its_parts_are_flown_by_themselves():
 def test_a_comparison_that_makes_no_sense_is_refused(changes, error, fault):
     with pytest.raises(error, match=fault):
         comparison(**changes)
+
+
+def test_another_robot_that_cannot_be_is_found_before_anything_is_flown(tmp_path):
+    for others, fault in (
+        ("DeadCable(9)", "no 'cable dead' of the robot of the task 'circle': there is no cable 9"),
+        ("lambda plant: None", "is no plant, but None"),
+    ):
+        (script := tmp_path / "script.py").write_text(SCRIPT.replace("DeadCable(1)", others))
+        with pytest.raises(RunError, match=fault):
+            run_comparison(script, "full", tmp_path / "out", executor := Here())
+        assert executor.done == 0
 
 
 def test_a_script_without_a_comparison_says_what_to_write(tmp_path):
@@ -387,6 +446,17 @@ def test_other_robots_differ_in_what_they_say():
     np.testing.assert_allclose(moved(Delayed(1)(plant), 61), own, atol=1e-12)
     assert moved(Loaded(0.1)(plant), 8)[0] < moved(plant, 8)[0]
     assert Noisier(3.0)(plant).noise == pytest.approx(3 * plant.noise)
+    # Each division keeps what it is beside the others, and a stiffness that is given counts as the material's does.
+    silicone, strain = Material(1e5, 0.5, 1000, damping=1e4), Strain(bending_y=1, bending_z=1)
+    given = Division(0.3, Section.circle(0.03), silicone, strain, stiffness=(1, 0.06, 0.06, 1, 1, 1))
+    stiff = Division(0.3, Section.circle(0.03), replace(silicone, young=1e6), strain, damping=lambda x: np.eye(6))
+    rod = Rod(divisions=(given, stiff), cables=plant.rod.cables)
+    soft = Softer(young=0.5, damping=2.0)(SimulatedPlant(rod)).rod
+    assert [division.material.young for division in soft.divisions] == [0.5e5, 0.5e6]
+    np.testing.assert_allclose(np.diag(soft.divisions[0].stiffness), np.array([1, 0.06, 0.06, 1, 1, 1]) / 2)
+    np.testing.assert_allclose(soft.divisions[1].damping(0.3), 2 * np.eye(6))
+    bent = rod.equilibrium(tension=[1, 0, 0]).tip[1]
+    assert soft.equilibrium(tension=[0.5, 0, 0]).tip[1] == pytest.approx(bent, rel=1e-6)
     # Damping does not move where it comes to rest.
     np.testing.assert_allclose(moved(Softer(damping=1.2)(plant), 900), still, atol=1e-6)
     assert replace(made, plant=Delayed(1)(plant)).plant.outputs == 2

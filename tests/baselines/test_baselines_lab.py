@@ -23,6 +23,7 @@ from socasadi.baselines.lab import _tuned
 from socasadi.campaign import Pilot
 from socasadi.codegen import c_compiler
 from socasadi.model import Entry
+from socasadi.mpc import DesignError
 
 
 def test_every_experiment_is_paid_by_the_second_and_none_is_begun_that_cannot_be():
@@ -88,6 +89,41 @@ def test_flights_are_records_unless_they_fail_and_their_noise_does_not_come_agai
     with pytest.raises(BudgetSpent):
         list(ModelSearch().offers(lab))
     assert len(set(seeds)) == len(seeds) > 8
+
+
+def test_noise_does_not_come_again_after_thetas_without_a_controller():
+    def build(x):
+        if x[0] > 1.0:
+            raise DesignError("too much")
+        return lab.study.mpc.controller(THETA)
+
+    class Heard(LinearPlant):
+        def reset(self, tip=None, *, seed=None, tension_bounds=(-np.inf, np.inf)):
+            seeds.append(seed)
+            return super().reset(tip, seed=seed)
+
+    seeds = []
+    lab = Lab(study(Heard()), (60.0,))
+    list(tuned(lab, (Entry("x", "1", 0.5, 2.0, "log"),), build, kind="sobol", most=8))
+    assert 0 < lab.flights < 8
+    for _ in range(3):
+        lab.fly(lab.study.mpc.controller(THETA))
+    assert len(set(seeds)) == len(seeds) == lab.flights
+    lab.fly(lab.study.mpc.controller(THETA), number=0)
+    assert seeds[-1] not in seeds[:-1]
+
+
+def test_a_robot_that_never_moves_is_not_flown_for_ever():
+    class Dead(LinearPlant):
+        def reset(self, tip=None, *, seed=None, tension_bounds=(-np.inf, np.inf)):
+            raise RuntimeError("no answer")
+
+    lab = Lab(study(Dead()), (60.0,))
+    assert list(ModelSearch("random").offers(lab)) == []
+    assert lab.flights == lab.failed == 1000
+    assert lab.spent == pytest.approx(50.0)  # a sample each
+    with pytest.raises(BudgetSpent):
+        ModelSearch("random").controller(Lab(study(Dead()), (6.0,)))
 
 
 def test_no_pulse_disturbs_what_a_model_is_fitted_to():

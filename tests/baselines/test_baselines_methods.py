@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from baselines_support import SYSTEM, THETA, LinearPlant, rod_study, study, watched
 
-from socasadi import SetPoints
+from socasadi import Cost, SetPoints
 from socasadi.baselines import (
     PID,
     DeePC,
@@ -15,7 +15,9 @@ from socasadi.baselines import (
     Koopman,
     Lab,
     Linearised,
+    ModelSearch,
     NonlinearMPC,
+    Softer,
     Subspace,
     WeightSearch,
     worth,
@@ -225,8 +227,38 @@ def test_only_a_probed_model_is_fitted_to_flights():
         WeightSearch("linearised", flights=3)
     with pytest.raises(ValueError, match="flights is at least 0, not -1"):
         WeightSearch(flights=-1)
-    with pytest.raises(ValueError, match="unknown model 'family'; there are subspace, linearised"):
-        WeightSearch("family")
+
+
+@pytest.mark.parametrize(
+    ("make", "fault"),
+    [
+        (lambda: WeightSearch("family"), "unknown model 'family'; there are subspace, linearised"),
+        (lambda: WeightSearch(by="median"), "unknown by 'median'; there are mean, worst"),
+        (lambda: ModelSearch("Sobol"), "unknown kind 'Sobol'; there are bayesian, sobol, random"),
+        (lambda: NonlinearMPC("pcc"), "unknown model 'pcc'; there are rod, constant curvature"),
+        (lambda: IterativeLearning(flights=0), "flights is at least 1, not 0"),
+        (lambda: DeePC(probing=-3.0), r"probing is at least 1, not -3\.0"),
+        (lambda: PID(probing="long"), "probing is at least 1, not 'long'"),
+        (lambda: next(Koopman(probing=2.0).offers(Lab(study(), (60.0,)))), "2 s has 40 samples; 82 are needed"),
+        (lambda: next(DeePC(probing=5.0).offers(Lab(study(), (60.0,)))), "5 s has 100 samples; 176 are needed"),
+    ],
+)
+def test_a_setting_that_makes_no_sense_is_refused(make, fault):
+    with pytest.raises(ValueError, match=fault):
+        make()
+    with pytest.raises(TypeError, match="over is a tuple"):
+        WeightSearch(over=Softer(0.8))
+
+
+@pytest.mark.parametrize("term", ["rate", "normalised", "literal"])
+def test_learning_knows_what_the_cost_weighs_of_the_inputs(term):
+    """The curvature by finite differences of J itself, in a loop without noise: the first step is Newton's."""
+    cost = Cost(input_term=term, R=1.0 if term == "rate" else 0.5 if term == "normalised" else 5e-3)
+    made = replace(study(LinearPlant(), preview=1), cost=cost)
+    lab = Lab(made, (60.0,))
+    costs = watched(lab)
+    IterativeLearning(WeightSearch(probing=10.0, most=1), flights=1, caution=0.0).controller(lab)
+    assert min(costs[2:]) < 0.97 * costs[1]
 
 
 def test_learning_from_flight_to_flight_lowers_the_cost_where_nothing_else_changes():

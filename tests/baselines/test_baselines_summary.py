@@ -58,6 +58,7 @@ def test_only_seeds_that_both_have_flown_are_compared_and_a_failure_is_far_behin
     cells = made_up({"ours": [[1.0, 2.0, 4.0]], "theirs": [[1.1, 2.2, np.inf]]})
     mixed = [cell for cell in cells if (cell["method"], cell["seed"]) != ("ours", 0)]
     told = Summary.of(mixed, ["task 0"], ["ours", "theirs"]).rivalries()["theirs"]
+    assert told.won == 1
     assert told.excess[0] > 1e5  # the quartile of 10 % and of a failure
     both = Summary.of(cells, ["task 0"], ["ours", "theirs"]).rivalries()["theirs"]
     assert both.excess[1] == pytest.approx(0.1)

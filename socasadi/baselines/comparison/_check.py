@@ -2,7 +2,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from ...campaign import Study, Task
-from ..lab import Method
+from ...plant import Plant
+from ..lab import Method, check_lent
 
 if TYPE_CHECKING:
     from ._comparison import Comparison
@@ -19,7 +20,7 @@ def check_comparison(comparison: "Comparison") -> None:
             if not isinstance(value, kinds):
                 raise TypeError(f"the {what} {name!r} is a {what.capitalize()}, not {value!r}")
     for name in comparison.tasks:
-        if not name or set(name) & set("/\\"):
+        if not isinstance(name, str) or not name or set(name) & set("/\\"):
             raise ValueError(f"the task {name!r} gives files their names: it is not empty and without slashes")
     for what in ("seeds", "checkpoints"):
         numbers, least = getattr(comparison, what), 0 if what == "seeds" else 1
@@ -31,10 +32,31 @@ def check_comparison(comparison: "Comparison") -> None:
         raise ValueError(f"checkpoints are numbers of episodes that ascend, not {list(comparison.checkpoints)}")
     if not isinstance(comparison.flights, int) or comparison.flights < 1:
         raise ValueError(f"flights are at least 1 of each controller, not {comparison.flights!r}")
+    check_lent(comparison.study)
+    for given in comparison.tasks.values():
+        if isinstance(given, Study):
+            check_lent(given)
+    if not isinstance(comparison.elsewhere, Mapping):
+        raise TypeError(f"elsewhere is a dictionary, other robots by name, not {comparison.elsewhere!r}")
     for name, other in comparison.elsewhere.items():
         if not callable(other):
             raise TypeError(f"elsewhere holds functions that make another robot of a plant; {name!r} is {other!r}")
-    if isinstance(comparison.elsewhere_on, str):
-        raise TypeError(f"elsewhere_on are names of tasks, not the text {comparison.elsewhere_on!r}")
+    if isinstance(comparison.elsewhere_on, str) or not isinstance(comparison.elsewhere_on, Sequence):
+        raise TypeError(f"elsewhere_on are names of tasks, not {comparison.elsewhere_on!r}")
+    if comparison.elsewhere and not comparison.elsewhere_on:
+        raise ValueError("elsewhere has robots, but elsewhere_on no task: name those whose controllers fly on them")
     if unknown := sorted(set(comparison.elsewhere_on) - set(comparison.tasks)):
         raise ValueError(f"elsewhere_on names {unknown[0]!r}; the tasks are {', '.join(comparison.tasks)}")
+
+
+def check_elsewhere(comparison: "Comparison") -> None:
+    """Raises ValueError if another robot cannot be made of one that it is to stand beside."""
+    for task in comparison.elsewhere_on:
+        plant = comparison.of(task, comparison.seeds[0]).plant
+        for name, other in comparison.elsewhere.items():
+            try:
+                made = other(plant)
+            except Exception as error:
+                raise ValueError(f"elsewhere: no {name!r} of the robot of the task {task!r}: {error}") from error
+            if not isinstance(made, Plant):
+                raise ValueError(f"elsewhere: {name!r} of the robot of the task {task!r} is no plant, but {made!r}")

@@ -2,7 +2,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from ...campaign import Study, Task
 from ...campaign.store import describe
@@ -15,6 +15,8 @@ Size = Literal["smoke", "quick", "full"]
 
 _SCHEMA = 2
 """Raised when what a cell holds is reckoned in another way, or what every method is given: all are flown again."""
+_SMOKE = 5.0
+"""s of a flight, at most, of the smallest size."""
 _NO_LIMIT = 1e8
 """s of wall time for a flight: a slow method, or a busy machine, is no failure."""
 
@@ -67,7 +69,7 @@ class Comparison:
         """The comparison as it is (``"full"``), or less of it.
 
         ``"quick"``: the first three seeds, checkpoints up to 30, three flights. ``"smoke"``, whether it works at all:
-        one seed, the first two tasks for 5 s, checkpoints up to 20, one flight, one other robot.
+        one seed, the first two tasks for 5 s at most, checkpoints up to 20, one flight, one other robot.
         """
         match size:
             case "full":
@@ -80,8 +82,7 @@ class Comparison:
                 points = tuple(at for at in self.checkpoints if at <= 20) or tuple(self.checkpoints[:1])
                 few = {"seeds": tuple(self.seeds)[:1], "checkpoints": points, "flights": 1}
                 others = dict(list(self.elsewhere.items())[:1])
-                on = tuple(name for name in self.elsewhere_on if name in tasks)
-                return replace(self, tasks=tasks, **few, elsewhere=others, elsewhere_on=on)
+                return replace(self, **few, **self._only(tasks, others))
         raise ValueError(f"a comparison is of size {', '.join(get_args(Size))}, not {size!r}")
 
     def of_parts(
@@ -102,8 +103,7 @@ class Comparison:
                 raise ValueError(f"there is no {kind} {unknown[0]!r}; there are {', '.join(known)}")
         kept = {name: task for name, task in self.tasks.items() if not tasks or name in tasks}
         flown = {name: method for name, method in self.methods.items() if not methods or name in methods}
-        on = tuple(name for name in self.elsewhere_on if name in kept)
-        return replace(self, tasks=kept, methods=flown, seeds=tuple(self.seeds)[:count], elsewhere_on=on)
+        return replace(self, methods=flown, seeds=tuple(self.seeds)[:count], **self._only(kept, self.elsewhere))
 
     def of(self, task: str, seed: int) -> Study:
         """The study of a task and a seed, its flights without a limit of wall time."""
@@ -138,8 +138,13 @@ class Comparison:
         }
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
 
+    def _only(self, tasks: Mapping[str, Task | Study], others: Elsewhere) -> dict[str, Any]:
+        on = tuple(name for name in self.elsewhere_on if name in tasks)
+        return {"tasks": tasks, "elsewhere_on": on, "elsewhere": others if on else {}}
+
     def _short(self, task: str) -> Task | Study:
         given = self.tasks[task]
-        if isinstance(given, Study):
-            return replace(given, task=replace(given.task, duration=5.0))
-        return replace(given, duration=5.0)
+        long = given.task if isinstance(given, Study) else given
+        duration, pulse = min(_SMOKE, long.duration), long.pulse
+        short = replace(long, duration=duration, pulse=pulse if pulse and pulse.time < duration / 2 else None)
+        return replace(given, task=short) if isinstance(given, Study) else short

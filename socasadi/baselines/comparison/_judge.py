@@ -8,14 +8,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...campaign import Pilot, Study, fly_once, probe
+from ...campaign import Pilot, Stream, Study, drawn_seed, fly_once, probe
 from ...model import state_space_error
 from ...mpc import Controller, ControllerInfo, LinearMPC
 from ...plant import Plant
 from ..lab import believed
-
-_VERIFICATION = 1
-"""Stream of random numbers: that of a campaign's verification."""
 
 Elsewhere = Mapping[str, Callable[[Plant], Plant]]
 """Other robots by name: each made of a study's own."""
@@ -64,7 +61,7 @@ def worth(study: Study, pilot: Pilot, flights: int) -> tuple[Worth, np.ndarray]:
     J, rmse, told, fallbacks, path = [], [], [], 0, np.zeros((0, study.mpc.outputs))
     failure = None
     for i in range(1, flights + 1):
-        episode = fly_once(study, timed, stream=(_VERIFICATION, i))
+        episode = fly_once(study, timed, (Stream.VERIFICATION, i))
         fallbacks += episode.fallbacks
         if i == 1:
             path = episode.truth
@@ -99,7 +96,7 @@ def open_loop_error(study: Study, pilot: Pilot) -> float:
         error = partial(state_space_error, believed(pilot))
     elif (error := getattr(pilot, "prediction_error", None)) is None:
         return np.nan
-    seed = int(np.random.SeedSequence([study.seed, _VERIFICATION, 0]).generate_state(1)[0])
+    seed = drawn_seed(study.seed, Stream.VERIFICATION, 0)
     try:
         record = probe(study.plant, study.mpc.input_bounds, seed=seed)
     except Exception:  # whatever a plant raises

@@ -10,25 +10,27 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...plant import Plant, SimulatedPlant
-from ...rod import Cable, Payload, Rod
+from ...rod import Cable, Division, Payload, Rod
 
 
 @dataclass(frozen=True)
 class Softer:
-    """The same rod of another material: factors on Young's modulus and on the damping."""
+    """The same rod of other materials: factors on the stiffness and the damping of all divisions."""
 
     young: float = 1.0
     damping: float = 1.0
 
     def __call__(self, plant: Plant) -> SimulatedPlant:
-        def changed(rod: Rod) -> Rod:
-            material = rod.divisions[0].material
-            return replace(
-                rod,
-                material=replace(material, young=self.young * material.young, damping=self.damping * material.damping),
-            )
+        return _another_rod(plant, lambda rod: replace(rod, divisions=tuple(map(self._softened, rod.divisions))))
 
-        return _another_rod(plant, changed)
+    def _softened(self, division: Division) -> Division:
+        material = division.material
+        return replace(
+            division,
+            material=replace(material, young=self.young * material.young, damping=self.damping * material.damping),
+            stiffness=_scaled(division.stiffness, self.young),
+            damping=_scaled(division.damping, self.damping),
+        )
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,7 @@ class Noisier:
     factor: float
 
     def __call__(self, plant: Plant) -> SimulatedPlant:
-        known = _simulated(plant)
-        return SimulatedPlant(known.rod, known.sample_time, self.factor * known.noise, known.output, known.substep)
+        return _another_rod(plant, noise=self.factor)
 
 
 @dataclass(frozen=True)
@@ -150,15 +151,17 @@ def _check_cable(index: int, cables: int) -> None:
         raise ValueError(f"there is no cable {index}; the robot's are 0 to {cables - 1}")
 
 
-def _simulated(plant: Plant) -> SimulatedPlant:
+def _another_rod(plant: Plant, change: Callable[[Rod], Rod] = lambda rod: rod, noise: float = 1.0) -> SimulatedPlant:
     if not isinstance(plant, SimulatedPlant):
         raise TypeError(f"only a simulated rod can be changed, not {type(plant).__name__}")
-    return plant
+    return SimulatedPlant(change(plant.rod), plant.sample_time, noise * plant.noise, plant.output, plant.substep)
 
 
-def _another_rod(plant: Plant, change: Callable[[Rod], Rod]) -> SimulatedPlant:
-    known = _simulated(plant)
-    return SimulatedPlant(change(known.rod), known.sample_time, known.noise, known.output, known.substep)
+def _scaled(law: Any, factor: float) -> Any:
+    """Of a division, so many times as large: None, numbers, or a function of the place."""
+    if law is None:
+        return None
+    return (lambda x: factor * np.asarray(law(x))) if callable(law) else factor * np.asarray(law)
 
 
 def _with(cables: tuple[Any, ...], index: int, change: Callable[[Any], Any]) -> tuple[Any, ...]:

@@ -89,17 +89,17 @@ def _of_class(kind: type, seen: set[int]) -> _Told:
 def _of_object(value: Any, name: str, seen: set[int]) -> _Told:
     kind = type(value)
     yield from _tell(kind, "", seen)
-    if _is_own(kind.__module__):
-        name, within = name or kind.__qualname__, getattr(value, "__dict__", {})
-    elif kind.__str__ is not object.__str__:  # an expression, a path
-        within = {}
+    if not (own := _is_own(kind.__module__)) and kind.__str__ is not object.__str__:  # an expression, a path
         if name and " at 0x" not in str(value):
             yield name, str(value)
-    else:
-        try:
-            within = parts(value)
-        except (TypeError, ValueError):  # a type written in C
-            within = {}
+        return
+    try:
+        within = parts(value)
+        if own:  # a constructor of one's own may take what no field holds
+            name = name or kind.__qualname__
+            within |= {key: getattr(value, key) for key in inspect.signature(kind).parameters if hasattr(value, key)}
+    except (TypeError, ValueError):  # a type written in C
+        return
     for key, part in within.items():
         yield from _tell(part, name and f"{name}.{key}", seen)
 

@@ -10,6 +10,7 @@ from typing import Any
 from ...campaign import load_script
 from ...campaign.store import RunError
 from ._cell import fly_cell
+from ._check import check_elsewhere
 from ._comparison import Comparison, Size
 from ._kept import store_cell, stored_cells
 
@@ -70,13 +71,18 @@ def run_comparison(
     Raises
     ------
     RunError
-        No worker can fly a cell, or they die of one; what was done is stored.
+        Another robot cannot be made, no worker can fly a cell, or they die of one; what was done is stored.
     """
     comparison = load_comparison(script, size).of_parts(tasks, methods, seeds)
     folder.mkdir(parents=True, exist_ok=True)  # what cannot be kept is not worth flying
     cells = [cell for cell in fitting_cells(comparison, folder) if not cell["broke"]]
     known = {(cell["task"], cell["method"], cell["seed"]) for cell in cells}
     missing = [names for names in comparison.cells if names not in known]
+    if missing:  # rather before the first flight than after it
+        try:
+            check_elsewhere(comparison)
+        except ValueError as error:
+            raise RunError(str(error)) from error
     total, losses = len(comparison.cells), Counter()
     waiting: dict[Future, tuple[str, str, int]] = {}
     gone: list[BrokenExecutor] = []

@@ -22,7 +22,7 @@ class Rivalry:
     Attributes
     ----------
     won, tasks
-        Tasks on which its median over the seeds is no higher, of how many.
+        Tasks on which its median over the seeds that both have is no higher, of how many.
     excess
         By what share the other's J is higher: quartiles over the seeds of the geometric mean over the tasks.
     p
@@ -109,8 +109,9 @@ class Summary:
                 for name in (first, method)
                 for values in [self.values(task, name, "J", checkpoint)]
             )
-            won += bool(np.median([*ours.values()]) <= np.median([*theirs.values()]))
-            quotients.append({seed: _log_quotient(theirs[seed], ours[seed]) for seed in ours if seed in theirs})
+            both = [seed for seed in ours if seed in theirs]
+            won += bool(both and np.median([ours[s] for s in both]) <= np.median([theirs[s] for s in both]))
+            quotients.append({seed: _log_quotient(theirs[seed], ours[seed]) for seed in both})
         seeds = [seed for seed in (quotients[0] if tasks else ()) if all(seed in row for row in quotients)]
         means = np.array([np.mean([row[seed] for row in quotients]) for seed in seeds])
         tested = len(means) >= _FEWEST and np.any(means)

@@ -1,10 +1,11 @@
 """What every method is given: a robot for a time, a search for its own numbers, a law that keeps the bounds."""
 
 from ._allocation import Allocation
-from ._lab import BudgetSpent, Lab
+from ._lab import BudgetSpent, Lab, check_lent
 from ._law import Forecast, Law, Program, looked_ahead
 from ._method import Information, Method
 from ._models import believed, identified, static_gain
+from ._settings import check_least
 from ._tuned import BESIDE_MODEL, tuned
 
 __all__ = [
@@ -18,6 +19,8 @@ __all__ = [
     "Method",
     "Program",
     "believed",
+    "check_least",
+    "check_lent",
     "identified",
     "looked_ahead",
     "static_gain",

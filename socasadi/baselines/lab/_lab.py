@@ -3,12 +3,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...campaign import Episode, Pilot, Study, Task, fly_once, probe
+from ...campaign import Episode, Pilot, Stream, Study, Task, drawn_seed, fly_once, probe
 from ...model import Record
 from ...plant import Plant
 
-_TRIAL, _PROBE = 0, 2
-"""Streams of random numbers: those of a campaign's trials and probing records."""
 _ROUNDING = 1e-9
 
 
@@ -19,8 +17,8 @@ class BudgetSpent(Exception):
 class Lab:
     """A robot with a task, lent for so many seconds of its time: what all methods are given alike.
 
-    Experiments are those of a campaign of the same study: the same cost, the same limits, the same noise in the
-    experiment of the same number.
+    Experiments are those of a campaign of the same study: the same cost, the same bounds, the same noise in the
+    experiment of the same number. Its limits, conditions and initial thetas are those of one search among many.
 
     Parameters
     ----------
@@ -37,38 +35,46 @@ class Lab:
         s of the robot's time so far.
     flights, probes, failed
         Experiments so far: of controllers, without one, and those of the former that failed.
+    numbered
+        The highest number of a flight so far; its noise depends on it.
 
     Raises
     ------
     ValueError
-        There is no checkpoint, or they do not ascend from more than 0 s.
+        There is no checkpoint, or they do not ascend from more than 0 s; or the study has limits or conditions, which
+        not all methods could keep.
     """
 
     def __init__(self, study: Study, checkpoints: Sequence[float], known: Plant | None = None) -> None:
         self.study, self.checkpoints, self.known = study, tuple(checkpoints), study.plant if known is None else known
         if not self.checkpoints or list(self.checkpoints) != sorted({*self.checkpoints}) or self.checkpoints[0] <= 0:
             raise ValueError(f"checkpoints are seconds that ascend from more than 0, not {list(checkpoints)}")
+        check_lent(study)
         self.spent = 0.0
-        self.flights = self.probes = self.failed = 0
+        self.flights = self.probes = self.failed = self.numbered = 0
 
     def due(self, flights: int = 1) -> bool:
         """Whether so many more flights may pass a checkpoint: who has a controller to offer should do so now."""
         then = self.spent + flights * self.study.task.duration
         return any(self.spent <= at + _ROUNDING < then for at in self.checkpoints)
 
-    def probe(self, duration: float = 20.0, hold: float = 1.0) -> Record:
+    def probe(self, duration: float = 20.0, hold: float = 1.0, *, least: int = 1) -> Record:
         """A probing record of so many s: random steps of all tensions, half of the way to their bounds at most.
 
         Each is held for ``hold`` s: the shorter, the less is told of the gain at rest, on which all tracking stands.
 
         Raises
         ------
+        ValueError
+            It would have fewer than ``least`` samples, without which it is of no use.
         BudgetSpent
             There is not so much time left.
         """
+        if (samples := round(duration / self.study.plant.sample_time)) < least:
+            raise ValueError(f"a record of {duration:g} s has {samples} samples; {least} are needed: probe for longer")
         self._check(duration)
         self.probes += 1
-        seed = int(np.random.SeedSequence([self.study.seed, _PROBE, self.probes]).generate_state(1)[0])
+        seed = drawn_seed(self.study.seed, Stream.PROBE, self.probes)
         record = probe(self.study.plant, self.study.mpc.input_bounds, duration=duration, hold=hold, seed=seed)
         self.spent += duration
         return record
@@ -89,7 +95,7 @@ class Lab:
         give_up
             Value of J from which on it is cut; the seconds that it saves are not counted.
         number
-            Of the experiment, which decides on its noise; by default how many there were, plus one.
+            Of the experiment, which decides on its noise; by default the one after the highest so far.
         plant, task
             Others than the study's, which take the robot's time alike.
 
@@ -102,8 +108,11 @@ class Lab:
         study = replace(self.study, **changed)
         self._check(study.task.duration)
         self.flights += 1
-        episode = fly_once(study, pilot, stream=(_TRIAL, number or self.flights), give_up=give_up)
-        self.spent += len(episode.tension) * episode.sample_time
+        number = self.numbered + 1 if number is None else number
+        self.numbered = max(self.numbered, number)
+        episode = fly_once(study, pilot, (Stream.TRIAL, number), give_up)
+        # Where not even the first sample came, the robot was occupied all the same.
+        self.spent += max(len(episode.tension), 1) * episode.sample_time
         self.failed += episode.failure is not None
         return episode
 
@@ -131,3 +140,10 @@ class Lab:
     def _check(self, duration: float) -> None:
         if self.spent + duration > self.checkpoints[-1] + _ROUNDING:
             raise BudgetSpent(f"{self.spent:g} s of {self.checkpoints[-1]:g} s are spent; {duration:g} s are needed")
+
+
+def check_lent(study: Study) -> None:
+    """Raises ValueError if a study asks for what a method need not know of: limits or conditions."""
+    for name in ("limits", "conditions"):
+        if asked := getattr(study, name):
+            raise ValueError(f"the study has {name}, which only its own search keeps: take them out of it ({asked!r})")

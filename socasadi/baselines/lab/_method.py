@@ -1,7 +1,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, fields
+from typing import Literal, get_args, get_origin
 
 from threadpoolctl import threadpool_limits
 
@@ -16,7 +16,18 @@ class Method(ABC):
     """A way to get a controller for a robot of which nothing is known but its data sheet and what it shows.
 
     One of one's own is a frozen dataclass that inherits this one and defines :meth:`offers`.
+
+    Raises
+    ------
+    ValueError
+        A setting whose type is a ``Literal`` is none of its values.
     """
+
+    def __post_init__(self) -> None:
+        for setting in fields(self):
+            value, known = getattr(self, setting.name), get_args(setting.type)
+            if get_origin(setting.type) is Literal and value not in known:
+                raise ValueError(f"unknown {setting.name} {value!r}; there are {', '.join(known)}")
 
     @property
     def information(self) -> Information:
@@ -28,7 +39,7 @@ class Method(ABC):
 
     @abstractmethod
     def offers(self, lab: Lab) -> Iterator[Pilot]:
-        """Spend the lab's time, and yield a controller whenever there is a better one than that before.
+        """Spend the lab's time, and yield a new controller whenever there is a better one than that before.
 
         What counts at a checkpoint is the last controller before it. The lab ends it all by :class:`BudgetSpent`, which
         is not to be caught.

@@ -21,8 +21,8 @@ At the lower ends the model is all but believed. Of Q and R only the quotient ma
 others.
 """
 
-_WITHOUT_FLIGHT = 1000
-"""Thetas in a row that give no controller, after which a search is over."""
+_IN_VAIN = 1000
+"""Thetas in a row that give no controller, or one whose flight fails, after which a search is over."""
 
 
 def search_for(kind: str, space: Space, study: Study, initial: Sequence[ArrayLike] = ()) -> Search:
@@ -78,9 +78,9 @@ def tuned(
         The lab's time is over before the search is.
     """
     study, search, in_vain = lab.study, search_for(kind, Space(knobs), lab.study, initial), 0
-    before = lab.flights
+    before = lab.numbered
     plants = [None, *(other(study.plant) for other in over)]
-    while in_vain < _WITHOUT_FLIGHT and len(search.trials) < most:
+    while in_vain < _IN_VAIN and len(search.trials) < most:
         theta, number = search.ask(), before + len(search.trials) + 1
         try:
             pilot = build(theta)
@@ -90,8 +90,9 @@ def tuned(
             continue
         best = search.best.cost if search.best else None
         give_up = None if best is None or study.give_up is None else study.give_up * best
-        in_vain = 0
-        _tell(search, theta, _flown(lab, pilot, plants, by, give_up, number))
+        outcome = _flown(lab, pilot, plants, by, give_up, number)
+        in_vain = in_vain + 1 if outcome.failed else 0
+        _tell(search, theta, outcome)
         if lab.due(len(plants)) and (chosen := search.best_estimated or search.best) is not None:
             yield build(chosen.theta)
     if (chosen := search.best_estimated or search.best) is not None:
@@ -104,6 +105,10 @@ class _Outcome:
 
     J: float | None = None
     at_least: float | None = None
+
+    @property
+    def failed(self) -> bool:
+        return self.J is None and self.at_least is None
 
 
 def _flown(
@@ -128,4 +133,4 @@ def _tell(search: Search, theta: np.ndarray, outcome: _Outcome) -> None:
     if outcome.at_least is not None:
         search.tell(theta, at_least=outcome.at_least)
     else:
-        search.tell(theta, outcome.J, failed=outcome.J is None)
+        search.tell(theta, outcome.J, failed=outcome.failed)

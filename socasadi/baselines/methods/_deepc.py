@@ -8,7 +8,10 @@ from scipy.linalg import null_space
 from ...campaign import Pilot
 from ...model import Entry, Record
 from ...mpc import LinearMPC
-from ..lab import Forecast, Lab, Law, Method, Program, looked_ahead, tuned
+from ..lab import Forecast, Lab, Law, Method, Program, check_least, looked_ahead, tuned
+
+_LONGEST_PAST = 24
+"""Samples."""
 
 
 @dataclass(frozen=True)
@@ -39,10 +42,16 @@ class DeePC(Method):
     probing: float = 40.0
     horizon: int = 20
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_least(1, probing=self.probing, horizon=self.horizon)
+
     def offers(self, lab: Lab) -> Iterator[Pilot]:
-        mpc, record = lab.study.mpc, lab.probe(self.probing)
+        mpc = lab.study.mpc
+        # As many as it takes for every course of inputs over the windows to be a combination of those in the record.
+        record = lab.probe(self.probing, least=(mpc.inputs + 1) * (_LONGEST_PAST + self.horizon))
         knobs = (
-            Entry("past", "samples", 4.0, 24.0, "log"),
+            Entry("past", "samples", 4.0, float(_LONGEST_PAST), "log"),
             Entry("on the combination", "1", 1e-4, 1e3, "log"),
             Entry("on the past", "1/m2", 1e2, 1e8, "log"),
             Entry("effort", "1", 0.01, 100.0, "log"),

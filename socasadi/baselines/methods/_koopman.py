@@ -7,7 +7,7 @@ import numpy as np
 from ...campaign import Pilot
 from ...model import Entry, Record
 from ...mpc import LinearMPC
-from ..lab import Forecast, Lab, Law, Method, Program, looked_ahead, tuned
+from ..lab import Forecast, Lab, Law, Method, Program, check_least, looked_ahead, tuned
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,12 @@ class Koopman(Method):
     degree: int = 3
     horizon: int = 20
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_least(1, probing=self.probing, delays=self.delays, degree=self.degree, horizon=self.horizon)
+
     def offers(self, lab: Lab) -> Iterator[Pilot]:
-        mpc, record = lab.study.mpc, lab.probe(self.probing)
+        mpc, record = lab.study.mpc, lab.probe(self.probing, least=2 * (self.delays + 1))
         knobs = (
             Entry("delays", "samples", 1.5, self.delays + 0.5, "log"),
             Entry("ridge", "1", 1e-7, 1e1, "log"),
@@ -118,7 +122,7 @@ class _Controller(Law):
     def _lift(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Newest first: outputs (delays + 1, p), m, and inputs (delays, m), as shares -> the lifted state."""
         y = y.ravel() / self._unit
-        factors = range(min(len(y), 4))
+        factors = range(2 * self.mpc.outputs)
         monomials = [
             y[list(combinations_with_replacement(factors, degree))].prod(axis=1)
             for degree in range(2, self._method.degree + 1)

@@ -5,10 +5,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cho_factor, cho_solve
 
-from ...campaign import Pilot
+from ...campaign import Pilot, Study
 from ...model import Record, StateSpace, state_space_error
 from ...mpc import Controller, ControllerInfo, weight_matrix
-from ..lab import Lab, Method, believed
+from ..lab import Lab, Method, believed, check_least
 from ._weights import WeightSearch
 
 _BEFORE, _AFTER = 40, 200
@@ -22,11 +22,11 @@ class IterativeLearning(Method):
     Norm-optimal iterative learning control (Bristow, Tharayil, Alleyne, "A survey of iterative learning control", IEEE
     Control Systems Magazine 26(3), 2006) about a tuned MPC. The shift c (T, p) changes by
 
-    .. math:: \arg\min_\Delta\; |e - T_y \Delta|_Q^2 + |\Delta u + T_u \Delta|_R^2 + \mu |\Delta|_Q^2,
+    .. math:: \arg\min_\Delta\; |e - T_y \Delta|_Q^2 + |w + T_w \Delta|_R^2 + \mu |\Delta|_Q^2,
 
-    where e and :math:`\Delta u` are errors and changes of inputs, means over some flights with the best shift so far,
-    and T says how the loop answers to a shift, by the MPC's model. Where that does not lower the mean J, mu is made
-    larger and the step shorter. What is learned is good for this one task alone.
+    where e and w are errors and what the cost's R weighs of the inputs, means over some flights with the best shift so
+    far, and T says how the loop answers to a shift, by the MPC's model. Where that does not lower the mean J, mu is
+    made larger and the step shorter. What is learned is good for this one task alone.
 
     Parameters
     ----------
@@ -42,6 +42,11 @@ class IterativeLearning(Method):
     flights: int = 3
     caution: float = 3.0
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_least(1, flights=self.flights)
+        check_least(0, caution=self.caution)
+
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         controller = None
         for controller in self.base.offers(lab):
@@ -51,13 +56,13 @@ class IterativeLearning(Method):
         study, mpc = lab.study, controller.mpc
         count, p, m = study.task.samples(mpc.sample_time), mpc.outputs, mpc.inputs
         to_y, to_u = _answers(controller, count)
-        to_change = to_u - np.roll(to_u, m, axis=0)
-        to_change[:m] = to_u[:m]
+        scale = mpc.input_scale[:, None]
+        to_weighed = _weighed(study, np.zeros((m, count * p)), to_u.reshape(count, m, count * p))
         Q, R = (
             np.kron(np.eye(count), weight_matrix(weight, size, name))
             for weight, size, name in ((study.cost.Q, p, "Q of the cost"), (study.cost.R, m, "R of the cost"))
         )
-        curvature = to_y.T @ Q @ to_y + to_change.T @ R @ to_change
+        curvature = to_y.T @ Q @ to_y + to_weighed.T @ R @ to_weighed
         caution, least, best, downhill = self.caution, np.inf, np.zeros((count, p)), np.zeros(count * p)
         shift = best
         while True:
@@ -68,9 +73,9 @@ class IterativeLearning(Method):
                 least, best = J, shift
                 yield pilot
                 errors = [(episode.reference - episode.output)[1:].ravel() for episode in episodes]
-                held = [np.vstack([episode.held, episode.tension]) / mpc.input_scale for episode in episodes]
-                change = np.mean([np.diff(inputs, axis=0).ravel() for inputs in held], axis=0)
-                downhill = to_y.T @ Q @ np.mean(errors, axis=0) - to_change.T @ R @ change
+                held, used = (np.mean([getattr(e, n) for e in episodes], axis=0) for n in ("held", "tension"))
+                weighed = _weighed(study, held[:, None] / scale, used[:, :, None] / scale)[:, 0]
+                downhill = to_y.T @ Q @ np.mean(errors, axis=0) - to_weighed.T @ R @ weighed
             elif least == np.inf:
                 return
             else:
@@ -101,6 +106,16 @@ class _Shifted:
         rows = np.minimum(self._samples + self._ahead, len(self._shift) - 1)
         self._samples += 1
         return self._controller.step(y, np.atleast_2d(reference) + self._shift[rows], disturbance)
+
+
+def _weighed(study: Study, held: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+    """What the cost's R weighs (T m, K) of inputs (T, m, K), shares of u_max, the last before them ``held`` (m, K)."""
+    match study.cost.input_term:
+        case "rate":
+            inputs = np.diff(inputs, axis=0, prepend=held[None])
+        case "literal":
+            inputs = inputs * study.mpc.input_scale[:, None]
+    return inputs.reshape(-1, inputs.shape[2])
 
 
 def _answers(controller: Controller, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from ...model import Fixed
 from ...mpc import LinearMPC
 from ...plant import SimulatedPlant
 from ...rod import Strain
-from ..lab import BESIDE_MODEL, Forecast, Information, Lab, Law, Method, Program, looked_ahead, tuned
+from ..lab import BESIDE_MODEL, Forecast, Information, Lab, Law, Method, Program, check_least, looked_ahead, tuned
 from ._fixed import known_rod, linearised
 from ._sampled import sampled
 
@@ -49,15 +49,17 @@ class NonlinearMPC(Method):
     doubt: float = 0.01
     trials: int = 60
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_least(1, horizon=self.horizon, trials=self.trials)
+
     @property
     def information(self) -> Information:
         return "plant model"
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         plant = known_rod(lab)
-        rod = plant.rod
-        if self.model == "constant curvature":
-            rod = replace(rod, strain=Strain(bending_y=0, bending_z=0))
+        rod = plant.rod if self.model == "rod" else replace(plant.rod, strain=Strain(bending_y=0, bending_z=0))
         believed = SimulatedPlant(rod, plant.sample_time, 0.0, plant.output)
         advance = compiled(sampled(believed, plant.inputs))
         # The rod takes the place of the model, so that nothing but the settings is left open.
@@ -85,8 +87,7 @@ class _Controller(Law):
     def act(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
         self._estimate(y)
         self._planned = np.vstack([self._planned[1:], self._planned[-1:]])
-        wanted = looked_ahead(reference, self._method.horizon)
-        self._planned = self._improved(wanted)
+        self._planned = self._improved(looked_ahead(reference, self._method.horizon))
         if not np.isfinite(self._planned).all():
             self._planned = np.tile(self.held, (self._method.horizon, 1))
             return np.full(self.mpc.inputs, np.nan)
@@ -112,7 +113,6 @@ class _Controller(Law):
         noise, n, p = self.mpc.noise, len(self._x), self.mpc.outputs
         if self._first:
             expected, C = (value.full() for value in (self._rest(self._x), self._rest.jacobian()(self._x, 0)))
-            expected = expected[:, 0]
         else:
             self._x, A, B, expected, C = self._sample(self._x, self.held)
             self._covariance[:n] = A @ self._covariance[:n]
@@ -123,7 +123,7 @@ class _Controller(Law):
         seen = np.hstack([C, np.eye(p)])
         spread = seen @ self._covariance @ seen.T + noise.measurement
         gain = np.linalg.solve(spread, seen @ self._covariance).T
-        correction = gain @ (y - expected - self._disturbance)
+        correction = gain @ (y - expected.ravel() - self._disturbance)
         self._x, self._disturbance = self._x + correction[:n], self._disturbance + correction[n:]
         self._covariance = self._covariance - gain @ seen @ self._covariance
 
@@ -139,10 +139,9 @@ class _Controller(Law):
             slopes[k] = C @ by_plan
         if not np.isfinite(slopes).all():
             return np.full_like(self._planned, np.nan)
-        now = (expected + self._disturbance).reshape(-1, 1)
         forecast = Forecast(
             input=(np.eye(N * m), (self._planned / scale).reshape(-1, 1)),
-            output=(slopes.reshape(N * p, -1), now),
+            output=(slopes.reshape(N * p, -1), (expected + self._disturbance).reshape(-1, 1)),
             reference=wanted.reshape(-1, 1),
             before=(self.held / scale)[:, None],
         )

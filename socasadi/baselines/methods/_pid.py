@@ -6,7 +6,7 @@ import numpy as np
 from ...campaign import Pilot
 from ...model import Entry, subspace
 from ...mpc import LinearMPC
-from ..lab import Allocation, Lab, Law, Method, static_gain, tuned
+from ..lab import Allocation, Lab, Law, Method, check_least, static_gain, tuned
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,10 @@ class PID(Method):
     """
 
     probing: float = 40.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_least(1, probing=self.probing)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         allocation = Allocation(static_gain(subspace(lab.probe(self.probing))))

@@ -8,7 +8,7 @@ from scipy.linalg import solve_continuous_are
 from ...campaign import Pilot
 from ...model import Entry, StateSpace, subspace
 from ...mpc import DesignError, LinearMPC
-from ..lab import Allocation, Lab, Law, Method, static_gain, tuned
+from ..lab import Allocation, Lab, Law, Method, check_least, static_gain, tuned
 
 _ABOVE_LEAST = 1.1
 """gamma of the controller, as a factor on the least that there is."""
@@ -33,6 +33,10 @@ class HInfinity(Method):
     """
 
     probing: float = 40.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_least(1, probing=self.probing)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         mpc, model = lab.study.mpc, subspace(lab.probe(self.probing))

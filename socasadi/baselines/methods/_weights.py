@@ -5,7 +5,7 @@ from typing import Literal
 from ...campaign import Pilot
 from ...model import Fixed, StateSpace, subspace
 from ...plant import Plant
-from ..lab import BESIDE_MODEL, Information, Lab, Method, tuned
+from ..lab import BESIDE_MODEL, Information, Lab, Method, check_least, tuned
 from ._fixed import linearised
 
 
@@ -41,8 +41,8 @@ class WeightSearch(Method):
     Raises
     ------
     ValueError
-        The model is unknown, the flights are fewer than none, or the linearised rod is to be fitted to them: without a
-        probing record they do not tell all gains.
+        A setting is unknown or out of its range, or the linearised rod is to be fitted to flights: without a probing
+        record they do not tell all gains.
     """
 
     model: Literal["subspace", "linearised"] = "subspace"
@@ -55,10 +55,11 @@ class WeightSearch(Method):
     most: int | None = None
 
     def __post_init__(self) -> None:
-        if self.model not in ("subspace", "linearised"):
-            raise ValueError(f"unknown model {self.model!r}; there are subspace, linearised")
-        if self.flights < 0:
-            raise ValueError(f"flights is at least 0, not {self.flights}")
+        super().__post_init__()
+        check_least(0, flights=self.flights)
+        check_least(1, probing=self.probing, most=1 if self.most is None else self.most)
+        if not isinstance(self.over, tuple):
+            raise TypeError(f"over is a tuple of functions that make another robot of a plant, not {self.over!r}")
         if self.flights and self.model == "linearised":
             raise ValueError(
                 f"flights={self.flights}: the linearised rod takes 0, only a probed model is fitted to them"

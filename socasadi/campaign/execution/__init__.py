@@ -8,6 +8,7 @@ from ._outcome import best_trial, flown_cost, keeps_limits, replayed
 from ._processes import Processes
 from ._progress import Clock, Progress, clock, print_progress, progress_line
 from ._script import load_script, load_study
+from ._stream import Stream, drawn_seed
 
 __all__ = [
     "Campaign",
@@ -15,10 +16,12 @@ __all__ = [
     "DaskExecutor",
     "Processes",
     "Progress",
+    "Stream",
     "best_trial",
     "check_run",
     "clock",
     "dask_executor",
+    "drawn_seed",
     "flown_cost",
     "fly_once",
     "keeps_limits",

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ...mpc import DesignError
 from ..experiment import Episode, Pilot, fly
+from ._stream import Stream, drawn_seed
 
 if TYPE_CHECKING:
     from .._study import Study
@@ -41,18 +41,17 @@ def fly_trial(study: "Study", number: int, theta: ArrayLike, give_up: float | No
         return Flown(None, f"DesignError: {error}", {"trial": time.perf_counter() - begin})
     seconds = {"design": time.perf_counter() - begin}
     try:
-        episode = fly_once(study, controller, stream=(0, number), give_up=give_up)
+        episode = fly_once(study, controller, (Stream.TRIAL, number), give_up=give_up)
     except TimeoutError as error:  # the alarm rang when the episode was over but not yet put together
         return Flown(None, f"TimeoutError: {error}", seconds | {"trial": time.perf_counter() - begin})
     return Flown(episode, None, seconds | episode.seconds | {"trial": time.perf_counter() - begin})
 
 
-def fly_once(study: "Study", controller: Pilot, stream: tuple[int, ...], give_up: float | None = None) -> Episode:
-    """One episode of the study, its noise drawn from the study's seed and ``stream``."""
-    seed = int(np.random.SeedSequence([study.seed, *stream]).generate_state(1)[0])
+def fly_once(study: "Study", controller: Pilot, noise: tuple[Stream, int], give_up: float | None = None) -> Episode:
+    """One episode of the study; its noise is that of the experiment of this number in a stream."""
     limits = {"time_limit": study.time_limit, "give_up": give_up, "cost": study.cost}
     with _alarm(study.time_limit):
-        return fly(study.plant, controller, study.task, seed=seed, **limits)
+        return fly(study.plant, controller, study.task, seed=drawn_seed(study.seed, *noise), **limits)
 
 
 @contextmanager
