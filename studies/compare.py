@@ -96,4 +96,5 @@ comparison = Comparison(
         "1 sample late": Delayed(1),
     },
     elsewhere_on=("circle",),
+    shown=("socasadi", "model search", "N4SID", "PID", "H-infinity", "Koopman", "DeePC", "nonlinear MPC"),
 )

@@ -76,7 +76,14 @@ def test_every_method_brings_a_controller_in_the_smoke_comparison(smoke):
 def test_its_figures_are_drawn(smoke):
     folder, _, _ = smoke
     figures = folder / "runs" / "compare-smoke" / "figures"
-    assert {file.stem for file in figures.glob("*.png")} == {"cost", "rmse", "methods", "paths", "elsewhere"}
+    assert {file.stem for file in figures.glob("*.png")} == {
+        "cost",
+        "rmse",
+        "methods",
+        "paths",
+        "distances",
+        "elsewhere",
+    }
     assert all(file.stat().st_size > 5000 for file in figures.glob("*.png"))
 
 

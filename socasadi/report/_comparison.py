@@ -1,4 +1,4 @@
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import matplotlib
@@ -6,23 +6,28 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from ..baselines import Comparison, Size, Summary
 from ..campaign import Study, Units
 from ._style import BLACK, BLUE, GREY, MM, ORANGE, PAGE, SETTINGS
 
-_COLOURS = (ORANGE, "#009E73", "#CC79A7", "#56B4E9", "#E69F00", BLACK, GREY)
-_DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)))
-_MARKERS = "sD^vPX*"
+_COLOURS = (BLUE, ORANGE, "#009E73", "#CC79A7", "#56B4E9", "#E69F00", BLACK)
+_DASHES = ("-", (0, (4, 1.5)))
+_MARKERS = "osD^vPX*"
+_PALE = "#B5B5B5"
+_MOST_SHOWN = 8
+_AVERAGED = 1.0
+"""s over which a distance is the root of its mean square."""
 _HIGHEST = 3.0
 """Times the least J, above which values stand on the edge."""
-_HIGHEST_RMSE = 100.0
+_HIGHEST_RMSE = 300.0
 """The same of RMSE, which spreads over decades."""
 
 
 def comparison_figures(summary: Summary, comparison: Comparison, size: Size) -> dict[str, Figure]:
-    """The figures of a comparison by name: cost and rmse over the robot's time, methods, paths, elsewhere.
+    """The figures of a comparison by name: cost and rmse over the robot's time, methods, paths, distances, elsewhere.
 
     Parameters
     ----------
@@ -35,14 +40,17 @@ def comparison_figures(summary: Summary, comparison: Comparison, size: Size) -> 
     comparison = comparison.of_parts(summary.tasks, summary.methods, len(summary.seeds))
     note = f"{size}: {comparison.extent}"
     if comparison.extent != whole.extent:
-        note += f"\nThe full comparison: {whole.extent}"
+        note += f"\nThe whole comparison: {whole.extent}"
     factor, unit = Units.of(comparison.study.plant).shown
+    shown = [name for name in summary.methods if name in (comparison.shown or _spread(summary))]
     with matplotlib.rc_context(SETTINGS):
+        rmse = "RMSE after 5 s"
         drawn = {
-            "cost": _over_time(summary, comparison, "J", 1.0, "J", _HIGHEST, note),
-            "rmse": _over_time(summary, comparison, "rmse", factor, f"RMSE after 5 s / {unit}", _HIGHEST_RMSE, note),
-            "methods": _methods(summary, note),
-            "paths": _paths(summary, comparison, factor, unit, note),
+            "cost": _over_time(summary, comparison, shown, "J", 1.0, "J", _HIGHEST, note),
+            "rmse": _over_time(summary, comparison, shown, "rmse", factor, f"{rmse} / {unit}", _HIGHEST_RMSE, note),
+            "methods": _methods(summary, shown, note),
+            "paths": _paths(summary, comparison, shown, factor, unit, note),
+            "distances": _distances(summary, comparison, shown, factor, unit, note),
         }
         for task in (task for task in comparison.elsewhere_on if summary.elsewhere(task)[1]):
             drawn[f"elsewhere-{task}" if len(comparison.elsewhere_on) > 1 else "elsewhere"] = _elsewhere(
@@ -51,14 +59,20 @@ def comparison_figures(summary: Summary, comparison: Comparison, size: Size) -> 
     return drawn
 
 
-def _look(summary: Summary, method: str) -> dict[str, Any]:
-    """Told apart by dashes and markers as well as by colour; the first method is bold."""
-    i = summary.methods.index(method)
-    if i == 0:
-        return {"color": BLUE, "ls": "-", "marker": "o", "lw": 1.8, "ms": 3.5, "zorder": 5}
-    colour, marker = _COLOURS[(i - 1) % len(_COLOURS)], _MARKERS[(i - 1) % len(_MARKERS)]
-    dashes = _DASHES[(i - 1) // len(_COLOURS) % len(_DASHES)]
-    return {"color": colour, "ls": dashes, "marker": marker, "lw": 0.8, "ms": 2.8, "mfc": "white", "mew": 0.7}
+def _look(shown: Sequence[str], method: str) -> dict[str, Any]:
+    """Told apart by markers as well as by colour; the first method is bold, and what is not picked out is pale."""
+    if method not in shown:
+        return {"color": _PALE, "ls": "-", "marker": "", "lw": 0.6, "zorder": 1.5}
+    i = shown.index(method)
+    look = {"color": _COLOURS[i % len(_COLOURS)], "marker": _MARKERS[i % len(_MARKERS)], "zorder": 3}
+    dashes = _DASHES[i // len(_COLOURS) % len(_DASHES)]
+    return look | {"ls": dashes, "lw": 1.8 if i == 0 else 0.9, "ms": 3.2, "mfc": look["color"] if i == 0 else "white"}
+
+
+def _legend(figure: Figure, looks: Mapping[str, Mapping[str, Any]]) -> None:
+    """Below all panels, by name."""
+    handles = [Line2D([], [], label=name, **look) for name, look in looks.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(5, len(handles)), handlelength=3.2)
 
 
 def _grid(summary: Summary, note: str, row: float, below: float) -> tuple[Figure, list[Axes]]:
@@ -76,9 +90,16 @@ def _grid(summary: Summary, note: str, row: float, below: float) -> tuple[Figure
 
 
 def _over_time(
-    summary: Summary, comparison: Comparison, name: str, factor: float, label: str, highest: float, note: str
+    summary: Summary,
+    comparison: Comparison,
+    shown: Sequence[str],
+    name: str,
+    factor: float,
+    label: str,
+    highest: float,
+    note: str,
 ) -> Figure:
-    figure, axes = _grid(summary, note, 50, 12 + 5.2 * -(-len(summary.methods) // 5))
+    figure, axes = _grid(summary, note, 52, 18)
     for place, task in zip(axes, summary.tasks, strict=False):
         duration = comparison.of(task, 0).task.duration
         time = duration * np.array(summary.checkpoints)
@@ -87,31 +108,31 @@ def _over_time(
             for method in summary.methods
             if summary.of_pair(task, method)
         }
-        known, upper = (np.concatenate([rows[:, i] for rows in quartiles.values()]) for i in (1, 2))
-        known, upper = known[np.isfinite(known)], upper[np.isfinite(upper)]
+        lower, known, upper = (np.concatenate([rows[:, i] for rows in quartiles.values()]) for i in range(3))
+        lower, known, upper = (values[np.isfinite(values)] for values in (lower, known, upper))
         if not known.size:
             continue
-        least = float(known.min())
-        top = min(highest * least, 1.05 * float(upper.max(initial=known.max())))
+        least = float(lower.min())
+        top = min(highest * float(known.min()), 1.05 * float(upper.max(initial=known.max())))
         for method, rows in quartiles.items():
             there = np.isfinite(rows[:, 1])
             low, middle, high = np.minimum(rows[there], top).T
-            # A line without a point that is not clipped would take up room at the figure's corner.
-            place.plot(time[there], middle, label=method, clip_on=not there.any(), **_look(summary, method))
-            if method == summary.methods[0]:
-                place.fill_between(time[there], low, high, color=BLUE, alpha=0.2, lw=0)
-            else:
-                place.vlines(time[there], low, high, color=_look(summary, method)["color"], lw=0.4)
+            # Above the scale there is a line along the edge, and no mark.
+            look: dict[str, Any] = _look(shown, method) | {"markevery": np.flatnonzero(middle < top).tolist()}
+            place.plot(time[there], middle, **look)
+            if method == shown[0]:
+                place.fill_between(time[there], low, high, color=look["color"], alpha=0.2, lw=0)
+            elif method in shown:
+                place.vlines(time[there], low, high, color=look["color"], lw=0.4)
         place.set(xscale="log", yscale="log", ylim=(0.95 * least, top))
-        ticks = (1, 1.5, 2, 3, 5, 7) if top < 10 * least else (1, 3)
-        for axis, parts in ((place.xaxis, (1, 2, 5)), (place.yaxis, ticks)):
-            _plain_log(axis, parts)
+        _plain_log(place.xaxis, (1, 2, 5))
+        _plain_log(place.yaxis, (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8) if top < 5 * least else (1, 3))
     for place in axes[:: min(3, len(summary.tasks))]:
         place.set_ylabel(label)
     for place in axes[max(len(summary.tasks) - 3, 0) : len(summary.tasks)]:
         place.set_xlabel("the robot's time / s")
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=5, handlelength=3.2)
+    looks = {method: _look(shown, method) for method in shown}
+    _legend(figure, looks | ({"others": _look((), "")} if len(shown) < len(summary.methods) else {}))
     return figure
 
 
@@ -122,9 +143,9 @@ def _plain_log(axis: Axis, parts: tuple[float, ...]) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
-def _methods(summary: Summary, note: str) -> Figure:
+def _methods(summary: Summary, shown: Sequence[str], note: str) -> Figure:
     """J of each method at the last checkpoint, as a multiple of the first method's: a row each, a panel a task."""
-    figure, axes = _grid(summary, note, 6 + 3.6 * len(summary.methods), 8)
+    figure, axes = _grid(summary, note, max(6 + 3.6 * len(summary.methods), 30), 8)
     rows = np.arange(len(summary.methods))[::-1]
     columns = min(3, len(summary.tasks))
     for i, (place, task) in enumerate(zip(axes, summary.tasks, strict=False)):
@@ -138,13 +159,14 @@ def _methods(summary: Summary, note: str) -> Figure:
             if not summary.of_pair(task, method):
                 continue
             low, middle, high = summary.over_time(task, method)[-1] / ours
-            look = _look(summary, method)
+            colour, marker = (_look(shown, method)[part] for part in ("color", "marker"))
+            colour = colour if method in shown else GREY
             if not np.isfinite(middle) or middle > _HIGHEST:
                 told = f"{middle:.3g} times" if np.isfinite(middle) else "failed"
                 place.annotate(told, (_HIGHEST, row), ha="right", va="center", fontsize=6)
                 continue
-            place.plot([low, min(high, _HIGHEST)], [row, row], color=look["color"], lw=1.2)
-            place.plot(middle, row, look["marker"], color=look["color"], ms=4)
+            place.plot([low, min(high, _HIGHEST)], [row, row], color=colour, lw=1.2)
+            place.plot(middle, row, marker or ".", color=colour, ms=4 if marker else 6)
         place.axvline(1.0, color=GREY, lw=0.6, ls=":")
         place.set(xscale="log", xlim=(0.8, _HIGHEST), ylim=(-0.7, len(rows) - 0.3))
         _plain_log(place.xaxis, (1, 1.5, 2, 3))
@@ -155,64 +177,103 @@ def _methods(summary: Summary, note: str) -> Figure:
     return figure
 
 
-def _paths(summary: Summary, comparison: Comparison, factor: float, unit: str, note: str) -> Figure:
-    """The true outputs of the first seed's last controllers in their plane, from the least J to the largest."""
-    figure, axes = _grid(summary, note, 58, 22)
-    shown = _shown(summary)
+def _paths(
+    summary: Summary, comparison: Comparison, shown: Sequence[str], factor: float, unit: str, note: str
+) -> Figure:
+    """The true outputs of the first seed's last controllers in their plane."""
+    figure, axes = _grid(summary, note, 58, 18)
+    looks: dict[str, dict[str, Any]] = {method: _look(shown, method) | {"marker": "", "lw": 0.9} for method in shown}
+    reference: dict[str, Any] = {"color": "#BBBBBB", "ls": "", "marker": ".", "ms": 3, "zorder": 0}
     for place, task in zip(axes, summary.tasks, strict=False):
-        study: Study = comparison.of(task, 0)
-        time = study.mpc.sample_time * np.arange(study.task.samples(study.mpc.sample_time) + 1)
-        place.plot(
-            *(factor * study.task.reference(time)[1:].T), ".", color="#BBBBBB", ms=3, zorder=0, label="reference"
-        )
-        for method in shown:
-            path = next((np.array(cell["path"]) for cell in summary.of_pair(task, method) if cell["path"]), None)
-            if path is not None:
-                look: dict[str, Any] = _look(summary, method) | {"marker": "", "lw": 1.0}
-                place.plot(*(factor * path.T), label=method, **look)
+        place.plot(*(factor * _wanted(comparison.of(task, 0))[1:].T), **reference)
+        for method, path in _flown(summary, task, shown):
+            place.plot(*(factor * path.T), **looks[method])
         place.set_aspect("equal", adjustable="datalim")
         place.set(xlabel=f"y / {unit}")
     for place in axes[:: min(3, len(summary.tasks))]:
         place.set_ylabel(f"z / {unit}")
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, handlelength=3.2)
+    _legend(figure, looks | {"reference": reference})
     return figure
 
 
-def _shown(summary: Summary, most: int = 6) -> Sequence[str]:
-    """The first method, and others from the best to the worst, in the median of their ranks: what is alike hides."""
+def _distances(
+    summary: Summary, comparison: Comparison, shown: Sequence[str], factor: float, unit: str, note: str
+) -> Figure:
+    """How far those paths are from their references, over time: what lies one on another in the plane is apart here."""
+    figure, axes = _grid(summary, note, 52, 18)
+    looks: dict[str, dict[str, Any]] = {method: _look(shown, method) | {"marker": "", "lw": 0.9} for method in shown}
+    for place, task in zip(axes, summary.tasks, strict=False):
+        study, largest = comparison.of(task, 0), 0.0
+        wanted = _wanted(study)
+        window = np.ones(max(round(_AVERAGED / study.mpc.sample_time), 1))
+        count = np.convolve(np.ones(len(wanted)), window, "same")
+        for method, path in _flown(summary, task, shown):
+            square = np.sum((factor * (path - wanted[: len(path)])) ** 2, axis=1)
+            distance = np.sqrt(np.convolve(square, window, "same") / count[: len(path)])
+            largest = max(largest, float(distance.max()))
+            place.plot(study.mpc.sample_time * np.arange(len(path)), distance, **looks[method])
+        if largest > 0:
+            place.set(yscale="log", ylim=(3e-4 * largest, 1.5 * largest))
+            _plain_log(place.yaxis, (1,))
+    for place in axes[:: min(3, len(summary.tasks))]:
+        place.set_ylabel(f"distance / {unit}")
+    for place in axes[max(len(summary.tasks) - 3, 0) : len(summary.tasks)]:
+        place.set_xlabel("time / s")
+    _legend(figure, looks)
+    return figure
+
+
+def _wanted(study: Study) -> np.ndarray:
+    """The reference (T + 1, p) at all samples of the task."""
+    time = study.mpc.sample_time * np.arange(study.task.samples(study.mpc.sample_time) + 1)
+    return study.task.reference(time)
+
+
+def _flown(summary: Summary, task: str, shown: Sequence[str]) -> Iterator[tuple[str, np.ndarray]]:
+    """The last one first, so that the first one is drawn over it."""
+    for method in reversed(shown):
+        path = next((np.array(cell["path"]) for cell in summary.of_pair(task, method) if cell["path"]), None)
+        if path is not None:
+            yield method, path
+
+
+def _spread(summary: Summary) -> Sequence[str]:
+    """The first method, and others from the best to the worst, in the median of their ranks."""
     ranks: dict[str, list[float]] = {}
     for task in summary.tasks:
         costs = {m: np.median(summary.values(task, m, "J")) for m in summary.methods if summary.of_pair(task, m)}
         for rank, method in enumerate(sorted(costs, key=lambda m: costs[m])):
             ranks.setdefault(method, []).append(rank)
     others = sorted((m for m in ranks if m != summary.methods[0]), key=lambda m: float(np.median(ranks[m])))
-    spread = np.unique(np.linspace(0, len(others) - 1, most - 1).round().astype(int)) if others else ()
+    spread = np.unique(np.linspace(0, len(others) - 1, _MOST_SHOWN - 1).round().astype(int)) if others else ()
     return [summary.methods[0], *(others[i] for i in spread)]
 
 
 def _elsewhere(summary: Summary, task: str, note: str) -> Figure:
-    """J on other robots as a multiple of J on the one that it was tuned for: a row a method, a column a robot."""
+    """J on other robots, shaded by how many times that on the one that it was tuned for: a row a method."""
     names, told = summary.elsewhere(task)
     methods = list(told)
-    shares = np.array([told[m] / np.median(summary.values(task, m, "J")) for m in methods]).reshape(len(methods), -1)
+    own = np.array([np.median(summary.values(task, m, "J")) for m in methods])
+    costs = np.array([[J, *told[m]] for J, m in zip(own, methods, strict=True)]).reshape(len(methods), -1)
+    with np.errstate(invalid="ignore"):  # where it failed on its own robot
+        shares = costs / own[:, None]
     figure = Figure(figsize=(PAGE, (34 + 5.2 * len(methods)) * MM))
     place = figure.subplots()
-    shade = np.log(np.clip(np.where(np.isfinite(shares), shares, 10.0), 1.0, 10.0))
+    shade = np.log10(np.clip(np.where(np.isfinite(shares), shares, 10.0), 1.0, 10.0))
     if shade.size:
-        place.imshow(shade, cmap="Blues", vmin=0, vmax=np.log(10), aspect="auto")
-    for i, method in enumerate(methods):
-        for j in range(len(names)):
-            value = told[method][j]
+        image = place.imshow(shade, cmap="Blues", vmin=0, vmax=1, aspect="auto")
+        bar = figure.colorbar(image, ax=place, pad=0.01, aspect=40, label="as a multiple of J on its own robot")
+        bar.set_ticks(np.log10([1, 2, 3, 5, 10]).tolist(), labels=["1", "2", "3", "5", "10 or more"])
+        bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+    for i in range(len(methods)):
+        for j, value in enumerate(costs[i]):
             text = f"{value:.3g}" if np.isfinite(value) else "failed"
-            dark = shade[i, j] > 0.55 * np.log(10)
+            dark = shade[i, j] > 0.55
             place.text(j, i, text, ha="center", va="center", fontsize=6, color="white" if dark else BLACK)
-    place.set_xticks(range(len(names)), names, rotation=30, ha="right")
+    place.set_xticks(range(costs.shape[1]), ["its own", *names], rotation=30, ha="right")
     place.set_yticks(range(len(methods)), methods)
     place.tick_params(length=0)
-    place.set_title(
-        f"{task}: J on robots that it was not tuned on; the darker, the more times J on its own", loc="left"
-    )
+    place.set_title(f"{task}: J on the robot that it was tuned for, and on others", loc="left")
     for side in place.spines.values():
         side.set_visible(False)
     figure.suptitle(note, fontsize=6, color=GREY, x=0.01, ha="left")

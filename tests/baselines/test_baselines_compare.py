@@ -78,6 +78,12 @@ class Better(Method):
         yield lab.study.mpc.controller(THETA)
 
 
+@dataclass(frozen=True)
+class Good(Method):
+    def offers(self, lab: Lab) -> Iterator[Pilot]:
+        yield lab.study.mpc.controller(THETA)
+
+
 class Here(Executor):
     """Does at once what it is given, and counts it."""
 
@@ -375,6 +381,8 @@ def test_some_of_its_parts_are_flown_by_themselves():
         ({"elsewhere": [DeadCable()]}, TypeError, "elsewhere is a dictionary"),
         ({"elsewhere": {"dead": DeadCable()}}, ValueError, "elsewhere_on no task"),
         ({"elsewhere_on": "circle"}, TypeError, "names of tasks, not 'circle'"),
+        ({"shown": ("best",)}, ValueError, "shown names 'best'; the methods are better, broken, never"),
+        ({"shown": "better"}, TypeError, "shown are names of methods, not 'better'"),
         ({"elsewhere_on": None}, TypeError, "names of tasks, not None"),
         ({"tasks": {1: Circle()}}, ValueError, "the task 1 gives files their names"),
         ({"study": replace(study(), conditions=(ClosedLoopStability(),))}, ValueError, "the study has conditions"),
@@ -412,8 +420,43 @@ def test_a_figure_says_how_much_was_flown_and_how_much_that_is_of():
     for figure in comparison_figures(summary, full, "quick").values():
         assert figure.get_suptitle() == (
             "quick: 1 method, 1 task, 1 seed, 1 flight each, 3 episodes' worth of the robot's time\n"
-            "The full comparison: 3 methods, 1 task, 10 seeds, 1 flight each, 110 episodes' worth of the robot's time"
+            "The whole comparison: 3 methods, 1 task, 10 seeds, 1 flight each, 110 episodes' worth of the robot's time"
         )
+
+
+def test_figures_pick_out_what_the_script_says_and_mark_nothing_above_their_scale():
+    """More than three times the least J is a line along the edge."""
+    made = comparison(methods={"good": Good(), "better": Better()}, checkpoints=(1, 2, 3), flights=1)
+    cells = [fly_cell(made, *names) for names in made.cells]
+    cells[1]["points"][0]["J"] = [99.0]
+    for shown, named in ((("better",), ["better", "others"]), ((), ["good", "better"])):
+        figures = comparison_figures(
+            Summary.of(cells, ["circle"], ["good", "better"]), replace(made, shown=shown), "full"
+        )
+        assert [text.get_text() for text in figures["cost"].legends[0].get_texts()] == named
+        (place,) = (axes for axes in figures["cost"].axes if axes.get_visible())
+        top = place.get_ylim()[1]
+        lines = [line for line in place.lines if line.get_marker() != ""]
+        assert len(lines) == len(shown or named)
+        for line in lines:
+            marked = line.get_ydata()[line.get_markevery()]
+            assert (marked < top).all()
+            assert len(marked) == np.sum(line.get_ydata() < top)
+    assert any(line.get_ydata()[0] == top for line in place.lines)
+
+
+def test_distances_are_from_the_reference_and_averaged_over_a_second():
+    made = comparison(methods={"good": Good()}, checkpoints=(1,), flights=1)
+    cell = fly_cell(made, "circle", "good", 0)
+    figures = comparison_figures(Summary.of([cell], ["circle"], ["good"]), made, "full")
+    (line,) = figures["distances"].axes[0].lines
+    path, time = 1e3 * np.array(cell["path"]), 0.05 * np.arange(121)
+    error = path - 30 * np.stack([np.cos(2 * np.pi * time / 6), np.sin(2 * np.pi * time / 6)], axis=1)
+    seen = np.array(line.get_ydata())
+    for k in (15, 60, 100):
+        around = error[k - 10 : k + 10]
+        assert seen[k] == pytest.approx(np.sqrt(np.mean(np.sum(around**2, axis=1))), rel=1e-6)
+    np.testing.assert_allclose(line.get_xdata(), time)
 
 
 def test_robots_that_cannot_be_are_refused():

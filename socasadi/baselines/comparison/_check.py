@@ -41,12 +41,14 @@ def check_comparison(comparison: "Comparison") -> None:
     for name, other in comparison.elsewhere.items():
         if not callable(other):
             raise TypeError(f"elsewhere holds functions that make another robot of a plant; {name!r} is {other!r}")
-    if isinstance(comparison.elsewhere_on, str) or not isinstance(comparison.elsewhere_on, Sequence):
-        raise TypeError(f"elsewhere_on are names of tasks, not {comparison.elsewhere_on!r}")
+    for what, kind, known in (("elsewhere_on", "task", comparison.tasks), ("shown", "method", comparison.methods)):
+        names = getattr(comparison, what)
+        if isinstance(names, str) or not isinstance(names, Sequence):
+            raise TypeError(f"{what} are names of {kind}s, not {names!r}")
+        if unknown := [name for name in names if name not in known]:
+            raise ValueError(f"{what} names {unknown[0]!r}; the {kind}s are {', '.join(known)}")
     if comparison.elsewhere and not comparison.elsewhere_on:
         raise ValueError("elsewhere has robots, but elsewhere_on no task: name those whose controllers fly on them")
-    if unknown := sorted(set(comparison.elsewhere_on) - set(comparison.tasks)):
-        raise ValueError(f"elsewhere_on names {unknown[0]!r}; the tasks are {', '.join(comparison.tasks)}")
 
 
 def check_elsewhere(comparison: "Comparison") -> None:

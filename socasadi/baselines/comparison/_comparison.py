@@ -44,6 +44,9 @@ class Comparison:
         Other robots by name, on which the last controllers of all methods are flown.
     elsewhere_on
         The tasks for which they are.
+    shown
+        Methods that figures with lines pick out, whose others are grey. None given: the first one, and of the others
+        some from the best to the worst.
 
     Raises
     ------
@@ -61,6 +64,7 @@ class Comparison:
     flights: int = 5
     elsewhere: Elsewhere = field(default_factory=dict)
     elsewhere_on: Sequence[str] = ()
+    shown: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         check_comparison(self)
@@ -103,7 +107,9 @@ class Comparison:
                 raise ValueError(f"there is no {kind} {unknown[0]!r}; there are {', '.join(known)}")
         kept = {name: task for name, task in self.tasks.items() if not tasks or name in tasks}
         flown = {name: method for name, method in self.methods.items() if not methods or name in methods}
-        return replace(self, methods=flown, seeds=tuple(self.seeds)[:count], **self._only(kept, self.elsewhere))
+        shown = tuple(name for name in self.shown if name in flown)
+        part = {"methods": flown, "shown": shown, "seeds": tuple(self.seeds)[:count]}
+        return replace(self, **part, **self._only(kept, self.elsewhere))
 
     def of(self, task: str, seed: int) -> Study:
         """The study of a task and a seed, its flights without a limit of wall time."""
