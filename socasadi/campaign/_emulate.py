@@ -52,13 +52,13 @@ def emulate(result: Result, *, real: Real = "float") -> ProcessorInTheLoop:
     ExportError
         The controller cannot be exported in ``real``.
     RunError
-        The episode failed.
+        The run has no trials, or the episode failed.
     """
     check_real(real)
-    if reason := toolchain():
-        raise EmulatorError(reason)
     study, core = result.study, core_for(real)
     theta, mpc = result.chosen.theta, replace(study.mpc, backend="active-set")
+    if reason := toolchain():
+        raise EmulatorError(reason)
     settings = {"seed": study.seed, "time_limit": max(study.time_limit, 600.0)}
     record = result.controller_record()
     with tempfile.TemporaryDirectory() as folder:
