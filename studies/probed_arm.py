@@ -6,7 +6,8 @@
 Forty seconds of random steps give a prediction model (N4SID), three flights of its controller the gains along the task.
 The model is then left alone, and theta is three numbers: factors on R, and on what the observer assumes of unknown
 inputs and of the disturbance, so far down that the model is all but believed. Five seed points and 25 iterations are
-enough for them. See "Would you have got there without" in README.md, also for what such trust costs elsewhere.
+enough for them. Where the arm may change, let the two of the observer end at 0.1: it will be trusted less. See "Would
+you have got there without" in README.md, also for what such trust costs elsewhere.
 """
 
 from dataclasses import replace
