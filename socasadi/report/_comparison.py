@@ -127,13 +127,18 @@ def _over_time(
         place.set(xscale="log", yscale="log", ylim=(0.95 * least, top))
         _plain_log(place.xaxis, (1, 2, 5))
         _plain_log(place.yaxis, (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8) if top < 5 * least else (1, 3))
-    for place in axes[:: min(3, len(summary.tasks))]:
-        place.set_ylabel(label)
-    for place in axes[max(len(summary.tasks) - 3, 0) : len(summary.tasks)]:
-        place.set_xlabel("the robot's time / s")
+    _label(axes, summary, "the robot's time / s", label)
     looks = {method: _look(shown, method) for method in shown}
     _legend(figure, looks | ({"others": _look((), "")} if len(shown) < len(summary.methods) else {}))
     return figure
+
+
+def _label(axes: Sequence[Axes], summary: Summary, below: str, beside: str) -> None:
+    """What the axes are: below the lowest panels, beside the first of each row."""
+    for place in axes[:: min(3, len(summary.tasks))]:
+        place.set_ylabel(beside)
+    for place in axes[max(len(summary.tasks) - 3, 0) : len(summary.tasks)]:
+        place.set_xlabel(below)
 
 
 def _plain_log(axis: Axis, parts: tuple[float, ...]) -> None:
@@ -189,9 +194,7 @@ def _paths(
         for method, path in _flown(summary, task, shown):
             place.plot(*(factor * path.T), **looks[method])
         place.set_aspect("equal", adjustable="datalim")
-        place.set(xlabel=f"y / {unit}")
-    for place in axes[:: min(3, len(summary.tasks))]:
-        place.set_ylabel(f"z / {unit}")
+    _label(axes, summary, f"y / {unit}", f"z / {unit}")
     _legend(figure, looks | {"reference": reference})
     return figure
 
@@ -215,10 +218,7 @@ def _distances(
         if largest > 0:
             place.set(yscale="log", ylim=(3e-4 * largest, 1.5 * largest))
             _plain_log(place.yaxis, (1,))
-    for place in axes[:: min(3, len(summary.tasks))]:
-        place.set_ylabel(f"distance / {unit}")
-    for place in axes[max(len(summary.tasks) - 3, 0) : len(summary.tasks)]:
-        place.set_xlabel("time / s")
+    _label(axes, summary, "time / s", f"distance / {unit}")
     _legend(figure, looks)
     return figure
 

@@ -9,6 +9,7 @@ from socasadi.baselines import load_comparison
 
 SCRIPT = """
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 import beside
@@ -18,6 +19,7 @@ from socasadi.model import Entry
 
 SHARES = [0.5, 1.0]
 GAINS = np.array([1.0, 2.0])
+OFFSET = partial(np.add, 1.0)
 TUNED = (Entry("x", "1", 0.5, 2.0, "log"),)
 
 
@@ -44,7 +46,11 @@ class Held(Holding):
 
 
 def build(lab):
-    return lambda x: Held(lab.study.mpc, *x)
+    return partial(made, Held, lab.study.mpc)
+
+
+def made(kind, mpc, x):
+    return kind(mpc, *x)
 
 
 class Mine(Method):
@@ -52,7 +58,7 @@ class Mine(Method):
         object.__setattr__(self, "budget", budget)
 
     def offers(self, lab):
-        yield from tuned(lab, TUNED, lambda x: build(lab)(x * SHARES[0]), most=self.budget)
+        yield from tuned(lab, TUNED, lambda x: build(lab)(OFFSET(x * SHARES[0])), most=self.budget)
 
 
 @dataclass(frozen=True)
@@ -83,6 +89,8 @@ EDITS = {
     "an array": ("[1.0, 2.0]", "[1.0, 3.0]"),
     "a list": ("[0.5, 1.0]", "[0.6, 1.0]"),
     "settings of a library's object": ('0.5, 2.0, "log"', '0.5, 4.0, "log"'),
+    "what a partial function was given": ("np.add, 1.0", "np.add, 2.0"),
+    "a function that a partial one is made of": ("kind(mpc, *x)", "kind(mpc, -x[0])"),
     "a nested function": ("x * SHARES[0]", "x * SHARES[1]"),
     "what a constructor of one's own was given": ("Mine(3)", "Mine(4)"),
     "a function of a module beside": ("half() * x", "half() + x"),

@@ -7,7 +7,7 @@ import sys
 import sysconfig
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from types import FunctionType, ModuleType
+from types import FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -45,6 +45,10 @@ def _tell(value: Any, name: str, seen: set[int]) -> _Told:
         case Mapping():
             for key, item in value.items():
                 yield from _tell(item, name and f"{name}[{key!r}]", seen)
+        case functools.partial():
+            yield from _tell((value.func, value.args, value.keywords), name, seen)
+        case MethodType():
+            yield from _tell((value.__func__, value.__self__), name, seen)
         case _ if id(value) in seen or isinstance(value, ModuleType):
             return
         case _:
