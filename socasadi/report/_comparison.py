@@ -21,7 +21,7 @@ _MOST_SHOWN = 8
 _AVERAGED = 1.0
 """s over which a distance is the root of its mean square."""
 _HIGHEST = 3.0
-"""Times the least J, above which values stand on the edge."""
+"""Times the least J, above which there is only a line along the edge."""
 _HIGHEST_RMSE = 300.0
 """The same of RMSE, which spreads over decades."""
 
@@ -208,12 +208,12 @@ def _distances(
     for place, task in zip(axes, summary.tasks, strict=False):
         study, largest = comparison.of(task, 0), 0.0
         wanted = _wanted(study)
-        window = np.ones(max(round(_AVERAGED / study.mpc.sample_time), 1))
-        count = np.convolve(np.ones(len(wanted)), window, "same")
         for method, path in _flown(summary, task, shown):
             square = np.sum((factor * (path - wanted[: len(path)])) ** 2, axis=1)
-            distance = np.sqrt(np.convolve(square, window, "same") / count[: len(path)])
-            largest = max(largest, float(distance.max()))
+            window = np.ones(min(max(round(_AVERAGED / study.mpc.sample_time), 1), len(path)))
+            count = np.convolve(np.ones(len(path)), window, "same")
+            distance = np.sqrt(np.convolve(square, window, "same") / count)
+            largest = max(largest, float(np.nanmax(distance, initial=0.0)))
             place.plot(study.mpc.sample_time * np.arange(len(path)), distance, **looks[method])
         if largest > 0:
             place.set(yscale="log", ylim=(3e-4 * largest, 1.5 * largest))
@@ -232,7 +232,9 @@ def _wanted(study: Study) -> np.ndarray:
 def _flown(summary: Summary, task: str, shown: Sequence[str]) -> Iterator[tuple[str, np.ndarray]]:
     """The last one first, so that the first one is drawn over it."""
     for method in reversed(shown):
-        path = next((np.array(cell["path"]) for cell in summary.of_pair(task, method) if cell["path"]), None)
+        path = next(
+            (np.array(cell["path"], dtype=float) for cell in summary.of_pair(task, method) if cell["path"]), None
+        )
         if path is not None:
             yield method, path
 

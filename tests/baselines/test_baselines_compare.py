@@ -172,7 +172,7 @@ def test_a_controller_that_breaks_when_it_is_judged_breaks_its_method_off():
 
     cell = fly_cell(comparison(methods={"faulty": Faulty()}), "circle", "faulty", 0)
     assert cell["broke"] == "IndexError: no such sample"
-    assert cell["points"] == [None, None, None]
+    assert all(point["J"] for point in cell["points"])  # what was flown is kept
 
 
 def test_a_plant_of_which_a_task_differs_is_not_known():
@@ -457,6 +457,15 @@ def test_distances_are_from_the_reference_and_averaged_over_a_second():
         around = error[k - 10 : k + 10]
         assert seen[k] == pytest.approx(np.sqrt(np.mean(np.sum(around**2, axis=1))), rel=1e-6)
     np.testing.assert_allclose(line.get_xdata(), time)
+    # A flight that broke off early is drawn as far as it went.
+    for rows in (1, 7, 30):
+        broken = cell | {"path": cell["path"][:rows]}
+        figures = comparison_figures(Summary.of([broken], ["circle"], ["good"]), made, "full")
+        (line,) = figures["distances"].axes[0].lines
+        assert len(line.get_ydata()) == rows
+        assert np.isfinite(line.get_ydata()).all()
+    last = np.sqrt(np.mean(np.sum(error[19:30] ** 2, axis=1)))
+    assert line.get_ydata()[-1] == pytest.approx(last, rel=1e-6)
 
 
 def test_robots_that_cannot_be_are_refused():

@@ -117,6 +117,17 @@ def test_of_inputs_that_reach_what_is_wanted_the_smallest_within_bounds_are_take
         np.testing.assert_allclose(gain @ u, gain @ inside, atol=1e-4 * np.abs(gain @ inside).max())
         assert not missed.any()
     assert at_bound > 3
+    uneven = np.diag([1.0, 0.02]) @ gain  # of a flat arm
+    for _ in range(40):
+        wanted = uneven @ rng.uniform(0, 10, 3)
+        u, missed = Allocation(uneven).inputs(wanted, (np.zeros(3), np.full(3, 10.0)))
+        assert not missed.any()
+        np.testing.assert_allclose(uneven @ u, wanted, atol=1e-4 * np.abs(wanted).max())
+    # Rates may leave an input no choice: those that rest out of their bounds.
+    u, _ = allocation.inputs(gain @ [1.0, 2.0, 3.0], (np.array([1.0, 0, 0]), np.array([1.0, 9, 9])))
+    np.testing.assert_allclose(gain @ u, gain @ [1.0, 2.0, 3.0], atol=1e-6)
+    assert u[0] == 1.0
+    assert allocation.inputs(gain @ inside, (np.ones(3), np.ones(3)))[0].tolist() == [1.0, 1.0, 1.0]
     u, missed = allocation.inputs(10 * gain @ inside, allowed)
     np.testing.assert_allclose(missed, 10 * gain @ inside - gain @ u, atol=1e-12)
     assert np.abs(missed).max() > 0.01
@@ -225,7 +236,7 @@ def test_a_model_fitted_to_flights_knows_the_motion_of_the_task_better():
 def test_only_a_probed_model_is_fitted_to_flights():
     with pytest.raises(ValueError, match="flights=3: the linearised rod takes 0"):
         WeightSearch("linearised", flights=3)
-    with pytest.raises(ValueError, match="flights is at least 0, not -1"):
+    with pytest.raises(ValueError, match="flights is a whole number of at least 0, not -1"):
         WeightSearch(flights=-1)
 
 
@@ -236,9 +247,12 @@ def test_only_a_probed_model_is_fitted_to_flights():
         (lambda: WeightSearch(by="median"), "unknown by 'median'; there are mean, worst"),
         (lambda: ModelSearch("Sobol"), "unknown kind 'Sobol'; there are bayesian, sobol, random"),
         (lambda: NonlinearMPC("pcc"), "unknown model 'pcc'; there are rod, constant curvature"),
-        (lambda: IterativeLearning(flights=0), "flights is at least 1, not 0"),
-        (lambda: DeePC(probing=-3.0), r"probing is at least 1, not -3\.0"),
-        (lambda: PID(probing="long"), "probing is at least 1, not 'long'"),
+        (lambda: IterativeLearning(flights=0), "flights is a whole number of at least 1, not 0"),
+        (lambda: DeePC(probing=-3.0), r"probing is a number of at least 1, not -3\.0"),
+        (lambda: PID(probing="long"), "probing is a number of at least 1, not 'long'"),
+        (lambda: Subspace(float("inf")), "probing is a number of at least 1, not inf"),
+        (lambda: Koopman(horizon=20.5), r"horizon is a whole number of at least 1, not 20\.5"),
+        (lambda: Koopman(delays=1), "delays is a whole number of at least 2, not 1"),
         (lambda: next(Koopman(probing=2.0).offers(Lab(study(), (60.0,)))), "2 s has 40 samples; 82 are needed"),
         (lambda: next(DeePC(probing=5.0).offers(Lab(study(), (60.0,)))), "5 s has 100 samples; 176 are needed"),
     ],

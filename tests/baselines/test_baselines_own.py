@@ -5,11 +5,11 @@ import sys
 
 import pytest
 
-from socasadi.baselines import load_comparison
+from socasadi.baselines import Lab, load_comparison
 
 SCRIPT = """
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import partial, wraps
 
 import numpy as np
 import beside
@@ -19,8 +19,21 @@ from socasadi.model import Entry
 
 SHARES = [0.5, 1.0]
 GAINS = np.array([1.0, 2.0])
+CACHE = {}
+HALF, WHOLE = (lambda x: 0.5 * x), (lambda x: 1.0 * x)
+GAINS[1] = 4.0
 OFFSET = partial(np.add, 1.0)
 TUNED = (Entry("x", "1", 0.5, 2.0, "log"),)
+
+
+def doubled(function):
+    'Twice what it gives.'
+
+    @wraps(function)
+    def inner(*args):
+        return 2.0 * function(*args)
+
+    return inner
 
 
 class Holding(Law):
@@ -37,8 +50,10 @@ class Holding(Law):
     def begin(self):
         pass
 
+    @doubled
     def act(self, y, reference):
-        return self.gain * GAINS[0] * beside.halved(self.held) * self.decay / self.scale
+        gain = HALF(self.gain) * GAINS[0] * np.mean(GAINS) * max(y[0], 1e-3)
+        return gain * beside.halved(self.held) * self.decay / self.scale
 
 
 class Held(Holding):
@@ -58,6 +73,7 @@ class Mine(Method):
         object.__setattr__(self, "budget", budget)
 
     def offers(self, lab):
+        CACHE["lab"] = lab
         yield from tuned(lab, TUNED, lambda x: build(lab)(OFFSET(x * SHARES[0])), most=self.budget)
 
 
@@ -87,6 +103,11 @@ EDITS = {
     "its method": ("/ self.scale", "* self.scale"),
     "its constructor": ("self.gain = gain", "self.gain = -gain"),
     "an array": ("[1.0, 2.0]", "[1.0, 3.0]"),
+    "what is put into it later": ("GAINS[1] = 4.0", "GAINS[1] = 5.0"),
+    "a function of a library": ("np.mean", "np.max"),
+    "a function of Python's own": ("max(y[0], 1e-3)", "min(y[0], 1e-3)"),
+    "the first of two functions without a name": ("0.5 * x)", "0.6 * x)"),
+    "what decorates": ("2.0 * function", "3.0 * function"),
     "a list": ("[0.5, 1.0]", "[0.6, 1.0]"),
     "settings of a library's object": ('0.5, 2.0, "log"', '0.5, 4.0, "log"'),
     "what a partial function was given": ("np.add, 1.0", "np.add, 2.0"),
@@ -123,7 +144,16 @@ def test_an_edit_makes_another_method_of_all_that_use_it(digests, old, new):
 
 def test_what_does_nothing_leaves_it_what_it_is(digests):
     moved = "# A remark.\n\n" + SCRIPT.replace("SHARES = ", "UNUSED = 3\nSHARES = ")
-    assert digests(moved, "\n\n" + BESIDE) == digests(SCRIPT)
+    moved = moved.replace('"mine": ', '"other": Outer(), "mine": ').replace("Twice what it gives", "Two times")
+    before, after = digests(SCRIPT), digests(moved, "# Another.\n\n" + BESIDE)
+    assert {name: after[name] for name in before} == before
+
+
+def test_what_a_method_keeps_while_it_runs_does_not_change_it(tmp_path, digests):
+    first = digests(SCRIPT)
+    made = load_comparison(tmp_path / "script.py")
+    list(made.methods["mine"].offers(Lab(made.study, (30.0,))))
+    assert made.digest("circle", "mine", 0) == first["mine"]
 
 
 def test_in_another_process_it_is_the_same(digests, tmp_path):

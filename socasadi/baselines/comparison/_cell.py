@@ -1,6 +1,6 @@
 import importlib.metadata
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from ...campaign import Pilot, Study
 from ...mpc import LinearMPC
 from ..lab import BudgetSpent, Lab
 from ._comparison import Comparison
-from ._judge import Elsewhere, open_loop_error, worth, worth_elsewhere
+from ._judge import open_loop_error, worth, worth_elsewhere
 
 
 def fly_cell(comparison: Comparison, task: str, method: str, seed: int) -> dict[str, Any]:
@@ -23,12 +23,10 @@ def fly_cell(comparison: Comparison, task: str, method: str, seed: int) -> dict[
 
 
 def _flown(comparison: Comparison, task: str, method: str, seed: int) -> dict[str, Any]:
-    study, began = comparison.of(task, seed), time.perf_counter()
+    study, began, digest = comparison.of(task, seed), time.perf_counter(), comparison.digest(task, method, seed)
     seconds = [at * study.task.duration for at in comparison.checkpoints]
     lab = Lab(study, seconds, known=comparison.study.plant)
-    judged = _Judged([None] * len(seconds), np.zeros((0, study.mpc.outputs)), {}, np.nan)
     offers, broke = {}, None
-    others = comparison.elsewhere if task in comparison.elsewhere_on else {}
     try:
         for pilot in comparison.methods[method].offers(lab):
             _check_offer(pilot, offers.get(seconds[-1]))
@@ -39,22 +37,30 @@ def _flown(comparison: Comparison, task: str, method: str, seed: int) -> dict[st
         raise
     except Exception as error:  # a method that cannot is a result; the others go on
         broke = f"{type(error).__name__}: {error}"
+    points, path, elsewhere, open_loop = [None] * len(seconds), np.zeros((0, study.mpc.outputs)), {}, np.nan
     try:
-        judged = _judged(study, [offers.get(at) for at in seconds], comparison.flights, others)
+        points, path = _judged(study, [offers.get(at) for at in seconds], comparison.flights)
+        if (last := offers.get(seconds[-1])) is not None:
+            open_loop = open_loop_error(study, last[0])
+            others = comparison.elsewhere if task in comparison.elsewhere_on else {}
+            told = worth_elsewhere(study, last[0], comparison.flights, others)
+            elsewhere = {name: asdict(value) for name, value in told.items()}
+    except ModuleNotFoundError:
+        raise
     except Exception as error:
         broke = broke or f"{type(error).__name__}: {error}"
     cell = {
-        "digest": comparison.digest(task, method, seed),
+        "digest": digest,
         "task": task,
         "method": method,
         "seed": seed,
         "information": comparison.methods[method].information,
         "episode": study.task.duration,
         "checkpoints": list(comparison.checkpoints),
-        "points": judged.points,
-        "path": np.round(judged.path, 5).tolist() if seed == comparison.seeds[0] else [],
-        "elsewhere": judged.elsewhere,
-        "open_loop": judged.open_loop,
+        "points": points,
+        "path": np.round(path, 7).tolist() if seed == comparison.seeds[0] else [],
+        "elsewhere": elsewhere,
+        "open_loop": open_loop,
         "flights": lab.flights,
         "failed": lab.failed,
         "spent": lab.spent,
@@ -77,18 +83,10 @@ def _check_offer(pilot: Any, last: tuple[Pilot, float] | None) -> None:
         )
 
 
-@dataclass(frozen=True)
-class _Judged:
-    """What is thought of offers: ``points`` at the checkpoints, the last one's true path, J elsewhere and its model."""
-
-    points: list[dict[str, Any] | None]
-    path: np.ndarray
-    elsewhere: dict[str, dict[str, Any]]
-    open_loop: float
-
-
-def _judged(study: Study, offers: list[tuple[Pilot, float] | None], flights: int, others: Elsewhere) -> _Judged:
-    """Of the offer at each checkpoint, with the robot's time that it had taken, s."""
+def _judged(
+    study: Study, offers: list[tuple[Pilot, float] | None], flights: int
+) -> tuple[list[dict[str, Any] | None], np.ndarray]:
+    """What each offer is worth, with the robot's time that it had taken, s; and the last one's true path."""
     known: dict[int, dict[str, Any]] = {}
     points, path = [], np.zeros((0, study.mpc.outputs))
     for offer in offers:
@@ -96,11 +94,7 @@ def _judged(study: Study, offers: list[tuple[Pilot, float] | None], flights: int
             value, path = worth(study, offer[0], flights)
             known[id(offer[0])] = asdict(value) | {"spent": offer[1]}
         points.append(None if offer is None else known[id(offer[0])])
-    if offers[-1] is None:
-        return _Judged(points, path, {}, np.nan)
-    pilot = offers[-1][0]
-    elsewhere = {name: asdict(value) for name, value in worth_elsewhere(study, pilot, flights, others).items()}
-    return _Judged(points, path, elsewhere, open_loop_error(study, pilot))
+    return points, path
 
 
 def _finite(value: Any) -> Any:

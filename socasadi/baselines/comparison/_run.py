@@ -74,6 +74,7 @@ def run_comparison(
         Another robot cannot be made, no worker can fly a cell, or they die of one; what was done is stored.
     """
     comparison = load_comparison(script, size).of_parts(tasks, methods, seeds)
+    digests = {names: comparison.digest(*names) for names in comparison.cells}  # of the script as it is now
     folder.mkdir(parents=True, exist_ok=True)  # what cannot be kept is not worth flying
     cells = [cell for cell in fitting_cells(comparison, folder) if not cell["broke"]]
     known = {(cell["task"], cell["method"], cell["seed"]) for cell in cells}
@@ -111,7 +112,7 @@ def run_comparison(
                 except Exception as error:
                     raise RunError(f"{name}: {error}") from error
                 else:
-                    if cell["digest"] != comparison.digest(*names):
+                    if cell["digest"] != digests[names]:
                         raise RunError(
                             f"{name}: a worker knows another {script.name}, which was edited, or the worker is older: "
                             "restart the workers, and give the command again"

@@ -22,7 +22,7 @@ class Rivalry:
     Attributes
     ----------
     won, tasks
-        Tasks on which its median over the seeds that both have is no higher, of how many.
+        Tasks on which its median over the seeds that both have is no higher, of those that have such seeds.
     excess
         By what share the other's J is higher: quartiles over the seeds of the geometric mean over the tasks.
     p
@@ -101,23 +101,24 @@ class Summary:
         from scipy.stats import wilcoxon  # takes its time to import
 
         first = self.methods[0]
-        tasks = [task for task in self.tasks if self.of_pair(task, first) and self.of_pair(task, method)]
-        won, quotients = 0, []
-        for task in tasks:
+        won, tasks, quotients = 0, 0, []
+        for task in self.tasks:
             ours, theirs = (
                 dict(zip((cell["seed"] for cell in self.of_pair(task, name)), values, strict=True))
                 for name in (first, method)
                 for values in [self.values(task, name, "J", checkpoint)]
             )
-            both = [seed for seed in ours if seed in theirs]
-            won += bool(both and np.median([ours[s] for s in both]) <= np.median([theirs[s] for s in both]))
+            if not (both := [seed for seed in ours if seed in theirs]):
+                continue
+            tasks += 1
+            won += bool(np.median([ours[s] for s in both]) <= np.median([theirs[s] for s in both]))
             quotients.append({seed: _log_quotient(theirs[seed], ours[seed]) for seed in both})
-        seeds = [seed for seed in (quotients[0] if tasks else ()) if all(seed in row for row in quotients)]
+        seeds = [seed for seed in (quotients[0] if quotients else ()) if all(seed in row for row in quotients)]
         means = np.array([np.mean([row[seed] for row in quotients]) for seed in seeds])
         tested = len(means) >= _FEWEST and np.any(means)
         p = float(wilcoxon(means)[1]) if tested else np.nan  # pyright: ignore[reportArgumentType]
         low, middle, high = np.expm1(_quartiles(means)).tolist()
-        return Rivalry(won, len(tasks), (low, middle, high), p)
+        return Rivalry(won, tasks, (low, middle, high), p)
 
     def elsewhere(self, task: str) -> tuple[list[str], dict[str, np.ndarray]]:
         """Names of other robots, and by method J there (robots,), medians over flights and seeds; infinite: failed."""

@@ -5,7 +5,7 @@ from ._lab import BudgetSpent, Lab, check_lent
 from ._law import Forecast, Law, Program, looked_ahead
 from ._method import Information, Method
 from ._models import believed, identified, static_gain
-from ._settings import check_least
+from ._settings import check_count, check_least
 from ._tuned import BESIDE_MODEL, tuned
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "Method",
     "Program",
     "believed",
+    "check_count",
     "check_least",
     "check_lent",
     "identified",

@@ -1,7 +1,7 @@
 import numpy as np
 
-_EFFORT = 1e-3
-"""Weight of the inputs beside the outputs', as a share of the largest gain: it chooses among those as near."""
+_EFFORT = 1e-5
+"""Weight of the inputs beside the outputs', as a share of the largest gain: it chooses among those as near, no more."""
 _REACHED = 1e-4
 """Share of what is wanted by which it may be missed and counts as reached."""
 
@@ -21,15 +21,17 @@ class Allocation:
     def inputs(self, wanted: np.ndarray, allowed: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """The smallest inputs (m,) within bounds whose outputs at rest come as near as can be to those wanted (p,).
 
-        And what they miss (p,): zero where the wanted output is reached.
+        And what bounds make them miss (p,): zero where they do not.
         """
         u, (lower, upper) = self.inverse @ wanted, allowed
         if not np.isfinite(u).all() or ((lower <= u) & (u <= upper)).all():
             return u, np.zeros(len(wanted))
         from scipy.optimize import lsq_linear  # takes its time to import
 
-        effort = _EFFORT * np.linalg.norm(self.gain, 2) * np.eye(len(u))
-        target = np.concatenate([wanted, np.zeros(len(u))])
-        u = lsq_linear(np.vstack([self.gain, effort]), target, allowed, method="bvls").x
+        free, u = lower < upper, np.where(lower < upper, 0.0, lower)
+        rows = np.vstack([self.gain, _EFFORT * np.linalg.norm(self.gain, 2) * np.eye(len(u))])
+        if free.any():
+            target = np.concatenate([wanted, np.zeros(len(u))]) - rows @ u
+            u[free] = lsq_linear(rows[:, free], target, (lower[free], upper[free]), method="bvls").x
         missed = wanted - self.gain @ u
         return u, np.where(np.abs(missed) > _REACHED * np.linalg.norm(wanted), missed, 0.0)

@@ -27,7 +27,7 @@ class Method(ABC):
         for setting in fields(self):
             value, known = getattr(self, setting.name), get_args(setting.type)
             if get_origin(setting.type) is Literal and value not in known:
-                raise ValueError(f"unknown {setting.name} {value!r}; there are {', '.join(known)}")
+                raise ValueError(f"unknown {setting.name} {value!r}; there are {', '.join(map(str, known))}")
 
     @property
     def information(self) -> Information:

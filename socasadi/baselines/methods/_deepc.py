@@ -8,7 +8,7 @@ from scipy.linalg import null_space
 from ...campaign import Pilot
 from ...model import Entry, Record
 from ...mpc import LinearMPC
-from ..lab import Forecast, Lab, Law, Method, Program, check_least, looked_ahead, tuned
+from ..lab import Forecast, Lab, Law, Method, Program, check_count, check_least, looked_ahead, tuned
 
 _LONGEST_PAST = 24
 """Samples."""
@@ -44,7 +44,8 @@ class DeePC(Method):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_least(1, probing=self.probing, horizon=self.horizon)
+        check_least(1, probing=self.probing)
+        check_count(1, horizon=self.horizon)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         mpc = lab.study.mpc

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from ...campaign import Pilot
 from ...model import StateSpace, subspace
 from ...plant import SimulatedPlant
-from ..lab import Information, Lab, Method, identified
+from ..lab import Information, Lab, Method, check_least, identified
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,10 @@ class Identified(Method):
     """
 
     probing: float = 40.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_least(1, probing=self.probing)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         yield lab.study.mpc.controller_for(identified(lab, self.probing))
@@ -36,6 +40,10 @@ class Subspace(Method):
     """
 
     probing: float = 40.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_least(1, probing=self.probing)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         yield lab.study.mpc.controller_for(subspace(lab.probe(self.probing)))

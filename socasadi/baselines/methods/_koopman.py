@@ -7,7 +7,7 @@ import numpy as np
 from ...campaign import Pilot
 from ...model import Entry, Record
 from ...mpc import LinearMPC
-from ..lab import Forecast, Lab, Law, Method, Program, check_least, looked_ahead, tuned
+from ..lab import Forecast, Lab, Law, Method, Program, check_count, check_least, looked_ahead, tuned
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,9 @@ class Koopman(Method):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_least(1, probing=self.probing, delays=self.delays, degree=self.degree, horizon=self.horizon)
+        check_least(1, probing=self.probing)
+        check_count(1, degree=self.degree, horizon=self.horizon)
+        check_count(2, delays=self.delays)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         mpc, record = lab.study.mpc, lab.probe(self.probing, least=2 * (self.delays + 1))
@@ -50,7 +52,9 @@ class Koopman(Method):
             Entry("gain of the disturbance", "1", 1e-4, 1.0, "log"),
             Entry("effort", "1", 0.01, 100.0, "log"),
         )
-        return tuned(lab, knobs, lambda x: _Controller(self, mpc, record, *x), initial=[(5.0, 1e-3, 0.2, 1.0)])
+        return tuned(
+            lab, knobs, lambda x: _Controller(self, mpc, record, *x), initial=[(min(5.0, self.delays), 1e-3, 0.2, 1.0)]
+        )
 
 
 class _Controller(Law):

@@ -8,7 +8,7 @@ from scipy.linalg import cho_factor, cho_solve
 from ...campaign import Pilot, Study
 from ...model import Record, StateSpace, state_space_error
 from ...mpc import Controller, ControllerInfo, weight_matrix
-from ..lab import Lab, Method, believed, check_least
+from ..lab import Lab, Method, believed, check_count, check_least
 from ._weights import WeightSearch
 
 _BEFORE, _AFTER = 40, 200
@@ -44,7 +44,7 @@ class IterativeLearning(Method):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_least(1, flights=self.flights)
+        check_count(1, flights=self.flights)
         check_least(0, caution=self.caution)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:

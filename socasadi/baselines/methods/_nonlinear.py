@@ -12,7 +12,7 @@ from ...model import Fixed
 from ...mpc import LinearMPC
 from ...plant import SimulatedPlant
 from ...rod import Strain
-from ..lab import BESIDE_MODEL, Forecast, Information, Lab, Law, Method, Program, check_least, looked_ahead, tuned
+from ..lab import BESIDE_MODEL, Forecast, Information, Lab, Law, Method, Program, check_count, looked_ahead, tuned
 from ._fixed import known_rod, linearised
 from ._sampled import sampled
 
@@ -51,7 +51,7 @@ class NonlinearMPC(Method):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_least(1, horizon=self.horizon, trials=self.trials)
+        check_count(1, horizon=self.horizon, trials=self.trials)
 
     @property
     def information(self) -> Information:

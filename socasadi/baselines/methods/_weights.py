@@ -5,7 +5,7 @@ from typing import Literal
 from ...campaign import Pilot
 from ...model import Fixed, StateSpace, subspace
 from ...plant import Plant
-from ..lab import BESIDE_MODEL, Information, Lab, Method, check_least, tuned
+from ..lab import BESIDE_MODEL, Information, Lab, Method, check_count, check_least, tuned
 from ._fixed import linearised
 
 
@@ -56,8 +56,11 @@ class WeightSearch(Method):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_least(0, flights=self.flights)
-        check_least(1, probing=self.probing, most=1 if self.most is None else self.most)
+        check_count(0, flights=self.flights)
+        if self.model == "subspace":
+            check_least(1, probing=self.probing)
+        if self.most is not None:
+            check_count(1, most=self.most)
         if not isinstance(self.over, tuple):
             raise TypeError(f"over is a tuple of functions that make another robot of a plant, not {self.over!r}")
         if self.flights and self.model == "linearised":

@@ -1,6 +1,5 @@
 """What a run folder keeps: every trial in an SQLite journal, and every setting as plain data."""
 
-from ._code import code_names, code_text, used_values
 from ._folder import (
     RunError,
     begun,
@@ -25,8 +24,6 @@ __all__ = [
     "RunError",
     "Trial",
     "begun",
-    "code_names",
-    "code_text",
     "compare_settings",
     "describe",
     "differences",
@@ -37,6 +34,5 @@ __all__ = [
     "rebuild",
     "settings_path",
     "unpack",
-    "used_values",
     "write_settings",
 ]

@@ -5,12 +5,10 @@ import hashlib
 import importlib
 import inspect
 from collections.abc import Callable
-from types import FunctionType, ModuleType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
-
-from ._code import code_text, used_values
 
 
 class ForeignTypeError(ValueError):
@@ -20,7 +18,7 @@ class ForeignTypeError(ValueError):
 def describe(value: Any) -> Any:
     """``value`` as JSON data: numbers, text, lists, and for an object its type with what it was constructed from.
 
-    Of an object its :func:`parts` are told. A function is told
+    An object is a dataclass, or one whose constructor arguments are attributes of the same names. A function is told
     from others by its code and the values that it uses, a symbolic expression by its text.
     """
     match value:
@@ -43,8 +41,8 @@ def describe(value: Any) -> Any:
 
 def parts(value: Any) -> dict[str, Any]:
     """What an object was constructed from: a dataclass, or one whose arguments are attributes of the same names."""
-    if dataclasses.is_dataclass(value):
-        names = [field.name for field in dataclasses.fields(value) if field.init]
+    if dataclasses.is_dataclass(value) and (fields := dataclasses.fields(value)):
+        names = [field.name for field in fields if field.init]
     else:
         names = [name for name in inspect.signature(type(value)).parameters if hasattr(value, name)]
     return {name: getattr(value, name) for name in names}
@@ -84,13 +82,28 @@ def differences(old: Any, new: Any, path: str = "") -> list[str]:
 
 def _body(function: FunctionType) -> dict[str, Any]:
     """What a function does: a digest of its code, its defaults, and the values and functions around it that it uses."""
+    variables = inspect.getclosurevars(function)
+    uses = {**variables.globals, **variables.nonlocals, **(function.__kwdefaults__ or {})}
+    uses |= {f"default {i}": value for i, value in enumerate(function.__defaults__ or ())}
     # What calls itself is described once, and a module by its name alone.
-    told = {
-        name: describe(value)
-        for name, value in used_values(function).items()
-        if value is not function and not isinstance(value, ModuleType)
-    }
-    return {"code": hashlib.sha256(code_text(function.__code__).encode()).hexdigest()[:16], "uses": told}
+    told = {name: describe(value) for name, value in uses.items() if value is not function and not _is_module(value)}
+    return {"code": hashlib.sha256(_code(function.__code__).encode()).hexdigest()[:16], "uses": told}
+
+
+def _is_module(value: Any) -> bool:
+    return isinstance(value, ModuleType)
+
+
+def _code(code: CodeType) -> str:
+    constants = [_constant(item) for item in code.co_consts]
+    return f"{code.co_code.hex()} {constants} {code.co_names}"
+
+
+def _constant(item: Any) -> str:
+    if isinstance(item, CodeType):
+        return _code(item)
+    # The order of a set is another in each process.
+    return repr(sorted(map(repr, item))) if isinstance(item, frozenset) else repr(item)
 
 
 def _public_name(kind: type | Callable[..., Any]) -> str:
