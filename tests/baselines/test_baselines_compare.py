@@ -8,20 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from baselines_support import THETA, LinearPlant, rod_study, study
+from baselines_support import THETA, LinearPlant, study
+from comparison_support import Better, comparison
 
-from socasadi import Circle, ClosedLoopStability, Overshoot, Pulse, Rod, SimulatedPlant
+from socasadi import Circle, ClosedLoopStability, Overshoot, Pulse
 from socasadi.baselines import (
-    Comparison,
     DeadCable,
-    Delayed,
     Lab,
-    Loaded,
     Method,
-    Misrouted,
-    Noisier,
-    Rubbing,
-    Softer,
     Summary,
     fitting_cells,
     fly_cell,
@@ -31,8 +25,6 @@ from socasadi.baselines import (
     worth,
 )
 from socasadi.campaign import Pilot, RunError
-from socasadi.report import comparison_figures
-from socasadi.rod import Division, Material, Section, Strain
 
 SCRIPT = """
 from baselines_support import study
@@ -52,38 +44,6 @@ comparison = Comparison(
 """
 
 
-@dataclass(frozen=True)
-class Never(Method):
-    def offers(self, lab: Lab) -> Iterator[Pilot]:
-        yield from ()
-
-
-@dataclass(frozen=True)
-class Broken(Method):
-    def offers(self, lab: Lab) -> Iterator[Pilot]:
-        yield lab.study.mpc.controller(THETA)
-        lab.fly(lab.study.mpc.controller(THETA))
-        raise ArithmeticError("it does not add up")
-
-
-@dataclass(frozen=True)
-class Better(Method):
-    """A poor controller at once, and the true one after two flights."""
-
-    def offers(self, lab: Lab) -> Iterator[Pilot]:
-        poor = lab.study.mpc.controller(THETA * np.where(np.arange(10) % 5 >= 2, 0.5, 1.0))
-        yield poor
-        lab.fly(poor)
-        lab.fly(poor)
-        yield lab.study.mpc.controller(THETA)
-
-
-@dataclass(frozen=True)
-class Good(Method):
-    def offers(self, lab: Lab) -> Iterator[Pilot]:
-        yield lab.study.mpc.controller(THETA)
-
-
 class Here(Executor):
     """Does at once what it is given, and counts it."""
 
@@ -95,18 +55,6 @@ class Here(Executor):
         self.done += 1
         future.set_result(fn(*args, **kwargs))
         return future
-
-
-def comparison(**changes):
-    made = {
-        "study": study(LinearPlant(noise=1e-3)),
-        "tasks": {"circle": Circle(radius=0.03, period=6.0, duration=6.0)},
-        "methods": {"better": Better(), "broken": Broken(), "never": Never()},
-        "seeds": (0,),
-        "checkpoints": (1, 2, 3),
-        "flights": 2,
-    }
-    return Comparison(**made | changes)
 
 
 def test_what_counts_at_a_checkpoint_is_the_last_controller_before_it():
@@ -411,104 +359,3 @@ def test_a_script_without_a_comparison_says_what_to_write(tmp_path):
     (script := tmp_path / "script.py").write_text("study = 1")
     with pytest.raises(RunError, match="defines no `comparison`"):
         load_comparison(Path(script))
-
-
-def test_a_figure_says_how_much_was_flown_and_how_much_that_is_of():
-    full = comparison(seeds=tuple(range(10)), checkpoints=(1, 2, 3, 110), flights=1)
-    flown = full.of_size("quick").of_parts(methods=["better"], seeds=1)
-    summary = Summary.of([fly_cell(flown, "circle", "better", 0)], ["circle"], ["better"])
-    for figure in comparison_figures(summary, full, "quick").values():
-        assert figure.get_suptitle() == (
-            "quick: 1 method, 1 task, 1 seed, 1 flight each, 3 episodes' worth of the robot's time\n"
-            "The whole comparison: 3 methods, 1 task, 10 seeds, 1 flight each, 110 episodes' worth of the robot's time"
-        )
-
-
-def test_figures_pick_out_what_the_script_says_and_mark_nothing_above_their_scale():
-    """More than three times the least J is a line along the edge."""
-    made = comparison(methods={"good": Good(), "better": Better()}, checkpoints=(1, 2, 3), flights=1)
-    cells = [fly_cell(made, *names) for names in made.cells]
-    cells[1]["points"][0]["J"] = [99.0]
-    for shown, named in ((("better",), ["better", "others"]), ((), ["good", "better"])):
-        figures = comparison_figures(
-            Summary.of(cells, ["circle"], ["good", "better"]), replace(made, shown=shown), "full"
-        )
-        assert [text.get_text() for text in figures["cost"].legends[0].get_texts()] == named
-        (place,) = (axes for axes in figures["cost"].axes if axes.get_visible())
-        top = place.get_ylim()[1]
-        lines = [line for line in place.lines if line.get_marker() != ""]
-        assert len(lines) == len(shown or named)
-        for line in lines:
-            marked = line.get_ydata()[line.get_markevery()]
-            assert (marked < top).all()
-            assert len(marked) == np.sum(line.get_ydata() < top)
-    assert any(line.get_ydata()[0] == top for line in place.lines)
-
-
-def test_distances_are_from_the_reference_and_averaged_over_a_second():
-    made = comparison(methods={"good": Good()}, checkpoints=(1,), flights=1)
-    cell = fly_cell(made, "circle", "good", 0)
-    figures = comparison_figures(Summary.of([cell], ["circle"], ["good"]), made, "full")
-    (line,) = figures["distances"].axes[0].lines
-    path, time = 1e3 * np.array(cell["path"]), 0.05 * np.arange(121)
-    error = path - 30 * np.stack([np.cos(2 * np.pi * time / 6), np.sin(2 * np.pi * time / 6)], axis=1)
-    seen = np.array(line.get_ydata())
-    for k in (15, 60, 100):
-        around = error[k - 10 : k + 10]
-        assert seen[k] == pytest.approx(np.sqrt(np.mean(np.sum(around**2, axis=1))), rel=1e-6)
-    np.testing.assert_allclose(line.get_xdata(), time)
-    # A flight that broke off early is drawn as far as it went.
-    for rows in (1, 7, 30):
-        broken = cell | {"path": cell["path"][:rows]}
-        figures = comparison_figures(Summary.of([broken], ["circle"], ["good"]), made, "full")
-        (line,) = figures["distances"].axes[0].lines
-        assert len(line.get_ydata()) == rows
-        assert np.isfinite(line.get_ydata()).all()
-    last = np.sqrt(np.mean(np.sum(error[19:30] ** 2, axis=1)))
-    assert line.get_ydata()[-1] == pytest.approx(last, rel=1e-6)
-
-
-def test_robots_that_cannot_be_are_refused():
-    plant = rod_study().plant
-    for other, fault in (
-        (Misrouted(1.2, cable=9), "no cable 9"),
-        (DeadCable(3), "are 0 to 2"),
-        (Delayed(-1), "not -1"),
-    ):
-        with pytest.raises(ValueError, match=fault):
-            other(plant)
-
-
-def test_other_robots_differ_in_what_they_say():
-    made = rod_study()
-    plant, tension = made.plant, np.array([6.0, 0.0, 0.0])
-
-    def moved(robot, samples=60):
-        robot.reset(seed=0)
-        for _ in range(samples):
-            robot.step(tension)
-        return np.array(robot.true_output)
-
-    own = moved(plant)
-    still = moved(plant, 900)
-    assert moved(Softer(young=0.8)(plant), 900)[0] == pytest.approx(still[0] / 0.8, rel=0.02)
-    assert moved(Misrouted(1.2)(plant), 900)[0] == pytest.approx(1.2 * still[0], rel=0.02)
-    assert moved(Rubbing(0.3)(plant), 900)[0] < still[0]
-    np.testing.assert_allclose(moved(DeadCable(0)(plant)), 0, atol=1e-9)
-    np.testing.assert_allclose(moved(Delayed(1)(plant), 61), own, atol=1e-12)
-    assert moved(Loaded(0.1)(plant), 8)[0] < moved(plant, 8)[0]
-    assert Noisier(3.0)(plant).noise == pytest.approx(3 * plant.noise)
-    # Each division keeps what it is beside the others, and a stiffness that is given counts as the material's does.
-    silicone, strain = Material(1e5, 0.5, 1000, damping=1e4), Strain(bending_y=1, bending_z=1)
-    given = Division(0.3, Section.circle(0.03), silicone, strain, stiffness=(1, 0.06, 0.06, 1, 1, 1))
-    stiff = Division(0.3, Section.circle(0.03), replace(silicone, young=1e6), strain, damping=lambda x: np.eye(6))
-    rod = Rod(divisions=(given, stiff), cables=plant.rod.cables)
-    soft = Softer(young=0.5, damping=2.0)(SimulatedPlant(rod)).rod
-    assert [division.material.young for division in soft.divisions] == [0.5e5, 0.5e6]
-    np.testing.assert_allclose(np.diag(soft.divisions[0].stiffness), np.array([1, 0.06, 0.06, 1, 1, 1]) / 2)
-    np.testing.assert_allclose(soft.divisions[1].damping(0.3), 2 * np.eye(6))
-    bent = rod.equilibrium(tension=[1, 0, 0]).tip[1]
-    assert soft.equilibrium(tension=[0.5, 0, 0]).tip[1] == pytest.approx(bent, rel=1e-6)
-    # Damping does not move where it comes to rest.
-    np.testing.assert_allclose(moved(Softer(damping=1.2)(plant), 900), still, atol=1e-6)
-    assert replace(made, plant=Delayed(1)(plant)).plant.outputs == 2

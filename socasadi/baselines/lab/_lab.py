@@ -18,7 +18,7 @@ class Lab:
     """A robot with a task, lent for so many seconds of its time: what all methods are given alike.
 
     Experiments are those of a campaign of the same study: the same cost, the same bounds, the same noise in the
-    experiment of the same number. The study's initial thetas are its own search's.
+    experiment of the same number. The study's initial thetas are not used.
 
     Parameters
     ----------
