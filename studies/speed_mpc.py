@@ -258,7 +258,7 @@ def growth(folder: Path, rounds: int) -> None:
             axis.grid(alpha=0.3)
         sizes.set_xlabel(label)
     axes[0, 0].set_ylabel("one solution, soft outputs, us")
-    axes[1, 0].set_ylabel("double precision, kB")
+    axes[1, 0].set_ylabel("memory in double precision, kB")
     for axis in axes[:, 1]:
         axis.legend(fontsize="small", loc="upper left")
     for left, right in axes:

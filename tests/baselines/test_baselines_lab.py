@@ -24,6 +24,7 @@ from socasadi.campaign import Pilot
 from socasadi.codegen import c_compiler
 from socasadi.model import Entry
 from socasadi.mpc import DesignError
+from socasadi.tune import Optimizer, Space
 
 
 def test_every_experiment_is_paid_by_the_second_and_none_is_begun_that_cannot_be():
@@ -164,6 +165,25 @@ def test_a_search_offers_its_best_at_every_checkpoint(kind):
     assert early[0] <= 12.0 < late[0] <= 48.0
     costs = [lab.cost(Lab(lab.study, (1e3,)).fly(pilot, number=99)) for _, pilot in (early, late)]
     assert costs[1] <= 1.02 * costs[0]
+
+
+def test_what_is_chosen_of_the_same_flights_does_not_depend_on_what_asked_for_them():
+    """Not the luckiest of points that learn nothing, but the one that the Bayesian search would believe in, too."""
+    lab = Lab(study(LinearPlant(noise=5e-3)), (1e3,))
+    entries, flown, mpc = (Entry("x", "1", 0.1, 1e3, "log"),), [], replace(lab.study.mpc, tuned=("R",))
+    costs = watched(lab)
+
+    def build(x):
+        flown.append(float(x[0]))
+        return mpc.controller([*THETA, *x])
+
+    list(tuned(lab, entries, build, kind="sobol", most=25))
+    *asked, chosen = flown
+    believer = Optimizer(Space(entries), seed=lab.study.seed)
+    for x, J in zip(asked, costs, strict=True):
+        believer.tell([x], J)
+    assert chosen == believer.best_estimated.theta[0]
+    assert chosen != asked[int(np.argmin(costs))]
 
 
 class Weak(LinearPlant):

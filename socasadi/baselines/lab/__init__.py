@@ -1,6 +1,7 @@
 """What every method is given: a robot for a time, a search for its own numbers, a law that keeps the bounds."""
 
 from ._allocation import Allocation
+from ._foresight import FORESIGHT, Foresight
 from ._lab import BudgetSpent, Lab, check_lent
 from ._law import Forecast, Law, Program, looked_ahead
 from ._method import Information, Method
@@ -10,9 +11,11 @@ from ._tuned import BESIDE_MODEL, tuned
 
 __all__ = [
     "BESIDE_MODEL",
+    "FORESIGHT",
     "Allocation",
     "BudgetSpent",
     "Forecast",
+    "Foresight",
     "Information",
     "Lab",
     "Law",

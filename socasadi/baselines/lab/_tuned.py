@@ -52,7 +52,7 @@ def tuned(
     """Fly what ``build`` makes of the knobs' values, and look for the best until the time is spent.
 
     This is what a campaign does with theta: the same search, the same noise, hopeless flights cut alike. The best is
-    the one that the search estimates, the luck of its flight left out, where it estimates any.
+    the one that a Gaussian process estimates, the luck of its flight left out, whatever asked for it.
 
     Parameters
     ----------
@@ -77,25 +77,27 @@ def tuned(
     BudgetSpent
         The lab's time is over before the search is.
     """
-    study, search, in_vain = lab.study, search_for(kind, Space(knobs), lab.study, initial), 0
-    before = lab.numbered
+    study, space, in_vain, before = lab.study, Space(knobs), 0, lab.numbered
+    search = search_for(kind, space, study, initial)
+    judge = search if isinstance(search, Optimizer) else Optimizer(space, seed=study.seed)
+    told = {search, judge}
     plants = [None, *(other(study.plant) for other in over)]
     while in_vain < _IN_VAIN and len(search.trials) < most:
         theta, number = search.ask(), before + len(search.trials) + 1
         try:
             pilot = build(theta)
         except DesignError:
-            search.tell(theta, failed=True)
+            _tell(told, theta, _Outcome())
             in_vain += 1
             continue
         best = search.best.cost if search.best else None
         give_up = None if best is None or study.give_up is None else study.give_up * best
         outcome = _flown(lab, pilot, plants, by, give_up, number)
         in_vain = in_vain + 1 if outcome.failed else 0
-        _tell(search, theta, outcome)
-        if lab.due(len(plants)) and (chosen := search.best_estimated or search.best) is not None:
+        _tell(told, theta, outcome)
+        if lab.due(len(plants)) and (chosen := judge.best_estimated or judge.best) is not None:
             yield build(chosen.theta)
-    if (chosen := search.best_estimated or search.best) is not None:
+    if (chosen := judge.best_estimated or judge.best) is not None:
         yield build(chosen.theta)
 
 
@@ -129,8 +131,6 @@ def _flown(
     return _Outcome(max(costs) if by == "worst" else sum(costs) / len(plants))
 
 
-def _tell(search: Search, theta: np.ndarray, outcome: _Outcome) -> None:
-    if outcome.at_least is not None:
-        search.tell(theta, at_least=outcome.at_least)
-    else:
-        search.tell(theta, outcome.J, failed=outcome.failed)
+def _tell(searches: set[Search], theta: np.ndarray, outcome: _Outcome) -> None:
+    for search in searches:
+        search.tell(theta, outcome.J, failed=outcome.failed, at_least=outcome.at_least)

@@ -2,11 +2,11 @@
 
 from ._deepc import DeePC
 from ._fixed import Identified, Linearised, Subspace
+from ._h_infinity import HInfinity
 from ._koopman import Koopman
 from ._learning import IterativeLearning
 from ._nonlinear import NonlinearMPC
 from ._pid import PID
-from ._robust import HInfinity
 from ._search import ModelSearch
 from ._weights import WeightSearch
 

@@ -8,7 +8,7 @@ from scipy.linalg import null_space
 from ...campaign import Pilot
 from ...model import Entry, Record
 from ...mpc import LinearMPC
-from ..lab import Forecast, Lab, Law, Method, Program, check_count, check_least, looked_ahead, tuned
+from ..lab import Forecast, Lab, Law, Method, Program, check_least, looked_ahead, tuned
 
 _LONGEST_PAST = 24
 """Samples."""
@@ -34,42 +34,38 @@ class DeePC(Method):
         Whether the matrices hold changes from sample to sample, which leaves no steady error.
     probing
         s of probing.
-    horizon
-        Samples that are looked ahead.
     """
 
     velocity: bool = False
     probing: float = 40.0
-    horizon: int = 20
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_least(1, probing=self.probing)
-        check_count(1, horizon=self.horizon)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         mpc = lab.study.mpc
         # As many as it takes for every course of inputs over the windows to be a combination of those in the record.
-        record = lab.probe(self.probing, least=(mpc.inputs + 1) * (_LONGEST_PAST + self.horizon))
+        record = lab.probe(self.probing, least=(mpc.inputs + 1) * (_LONGEST_PAST + mpc.horizon))
         knobs = (
             Entry("past", "samples", 4.0, float(_LONGEST_PAST), "log"),
             Entry("on the combination", "1", 1e-4, 1e3, "log"),
             Entry("on the past", "1/m2", 1e2, 1e8, "log"),
             Entry("effort", "1", 0.01, 100.0, "log"),
         )
-        return tuned(lab, knobs, lambda x: _Controller(self, mpc, record, *x), initial=[(10.0, 1.0, 1e5, 1.0)])
+        return tuned(lab, knobs, lambda x: _Controller(mpc, self.velocity, record, *x), initial=[(10.0, 1.0, 1e5, 1.0)])
 
 
 class _Controller(Law):
     def __init__(
-        self, method: DeePC, mpc: LinearMPC, record: Record, past: float, on_g: float, on_past: float, effort: float
+        self, mpc: LinearMPC, velocity: bool, record: Record, past: float, on_g: float, on_past: float, effort: float
     ) -> None:
         super().__init__(mpc)
-        m, p, past, N = mpc.inputs, mpc.outputs, round(past), method.horizon
-        self._past, self._horizon, self._velocity = past, N, method.velocity
+        m, p, past, N = mpc.inputs, mpc.outputs, round(past), mpc.horizon
+        self._past, self._velocity = past, velocity
         # An output belongs to the input that was held before it.
         u, y = record.tension / mpc.input_scale, record.output[1:]
-        if method.velocity:
+        if velocity:
             u, y = np.diff(u, axis=0), np.diff(y, axis=0)
         # With g = Q h, where Q spans the rows of the matrices, nothing grows with the length of the record.
         matrices = np.vstack([_hankel(u, past + N), _hankel(y, past + N)])
@@ -85,7 +81,7 @@ class _Controller(Law):
         # h = known p + free z keeps U_p h = u_ini.
         known, free = np.linalg.pinv(Up, rcond=1e-8) @ pick["u"], null_space(Up, rcond=1e-8)
         input, output = (Uf @ free, Uf @ known), (Yf @ free, Yf @ known)
-        if method.velocity:
+        if velocity:
             add_u, add_y = (np.kron(np.tril(np.ones((N, N))), np.eye(size)) for size in (m, p))
             input = (add_u @ input[0], add_u @ input[1] + np.tile(pick["before"], (N, 1)))
             output = (add_y @ output[0], add_y @ output[1] + np.tile(pick["now"], (N, 1)))
@@ -110,7 +106,7 @@ class _Controller(Law):
             self._y = np.vstack([self._y[1:], y])
             self._u = np.vstack([self._u[1:], before])
         u, past = (np.diff(self._u, axis=0), np.diff(self._y, axis=0)) if self._velocity else (self._u[1:], self._y[1:])
-        ahead = looked_ahead(reference, self._horizon)
+        ahead = looked_ahead(reference, self.mpc.horizon)
         return self._program.inputs(np.concatenate([u, past, ahead, before, y], axis=None), self.info)[0]
 
 

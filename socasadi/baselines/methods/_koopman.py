@@ -17,9 +17,9 @@ class Koopman(Method):
     Bruder, Gillespie, Remy, Vasudevan, "Modeling and control of soft robots using the Koopman operator and model
     predictive control", RSS 2019 (arXiv 1902.02827); Bruder et al., IEEE Trans. Robotics 37, 2020. The lifting holds
     outputs and inputs of the last samples, and monomials of the outputs among them; the lifted state comes from
-    measurements at every sample. Beyond the papers a constant disturbance of the outputs is estimated, lest there is a
-    steady error. How many samples are lifted, the ridge of the fit, the gain of that estimate and a factor on R are
-    tuned by flights.
+    measurements at every sample. Beyond the papers what the prediction of the lifted state misses at rest is estimated
+    and added to each step that is looked ahead, so that there is no steady error. How many samples are lifted, the
+    ridge of the fit, the gain of that estimate and a factor on R are tuned by flights.
 
     Parameters
     ----------
@@ -29,19 +29,16 @@ class Koopman(Method):
         Samples that are lifted, at most.
     degree
         Of the monomials of the last two samples' outputs, at most.
-    horizon
-        Samples that are looked ahead.
     """
 
     probing: float = 40.0
     delays: int = 40
     degree: int = 3
-    horizon: int = 20
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_least(1, probing=self.probing)
-        check_count(1, degree=self.degree, horizon=self.horizon)
+        check_count(1, degree=self.degree)
         check_count(2, delays=self.delays)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
@@ -49,7 +46,7 @@ class Koopman(Method):
         knobs = (
             Entry("delays", "samples", 1.5, self.delays + 0.5, "log"),
             Entry("ridge", "1", 1e-7, 1e1, "log"),
-            Entry("gain of the disturbance", "1", 1e-4, 1.0, "log"),
+            Entry("gain of what is missed", "1", 1e-4, 1.0, "log"),
             Entry("effort", "1", 0.01, 100.0, "log"),
         )
         return tuned(
@@ -70,7 +67,7 @@ class _Controller(Law):
     ) -> None:
         super().__init__(mpc)
         self._delays = d = round(delays)
-        self._method, self._gain, p, m, N = method, gain, mpc.outputs, mpc.inputs, method.horizon
+        self._method, self._gain, p, m, N = method, gain, mpc.outputs, mpc.inputs, mpc.horizon
         self._unit = float(np.abs(record.output).max())  # so that monomials are of the size of what they are made of
         u, y = record.tension / mpc.input_scale, record.output
         lifted = np.array([self._lift(y[t - d : t + 1][::-1], u[t - d : t][::-1]) for t in range(d, len(u) + 1)])
@@ -78,19 +75,19 @@ class _Controller(Law):
         size = lifted.shape[1]
         fitted = np.linalg.solve(known.T @ known + ridge * len(known) * np.eye(known.shape[1]), known.T @ lifted[1:]).T
         self._A, self._B = fitted[:, :size], fitted[:, size:]
-        # Outputs over the horizon: from the lifted state, from each input, and the disturbance.
+        # Outputs over the horizon: from the lifted state, what each step misses of it, and each input.
         C = self._unit * np.eye(size)[:p]
         powers = [C]
         for _ in range(N):
             powers.append(powers[-1] @ self._A)
-        total = size + p + N * p + m
-        by_state = np.vstack(powers[1:])
+        total = 2 * size + N * p + m
+        by_state, by_missed = np.vstack(powers[1:]), np.cumsum(powers[:-1], axis=0).reshape(N * p, size)
         by_input = np.zeros((N * p, N * m))
         for k in range(N):
             for j in range(k + 1):
                 by_input[k * p : (k + 1) * p, j * m : (j + 1) * m] = powers[k - j] @ self._B
-        known_part = np.hstack([by_state, np.tile(np.eye(p), (N, 1)), np.zeros((N * p, N * p + m))])
-        reference = np.eye(total)[size + p : size + p + N * p]
+        known_part = np.hstack([by_state, by_missed, np.zeros((N * p, N * p + m))])
+        reference = np.eye(total)[2 * size : 2 * size + N * p]
         inputs = (np.eye(N * m), np.zeros((N * m, total)))
         self._program = Program(mpc, Forecast(inputs, (by_input, known_part), reference, np.eye(total)[-m:]), effort)
         self.begin()
@@ -99,20 +96,22 @@ class _Controller(Law):
         self._program.forget()
         self._u = np.tile(self.held / self.mpc.input_scale, (self._delays, 1))
         self._y: np.ndarray | None = None
-        self._disturbance, self._lifted = np.zeros(self.mpc.outputs), None
+        self._missed, self._lifted = np.zeros(len(self._A)), None
 
     def act(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
         before = self.held / self.mpc.input_scale
-        if self._y is None or self._lifted is None:  # it was at rest so far
+        if self._y is None:  # it was at rest so far
             self._y = np.tile(y, (self._delays + 1, 1))
         else:
             self._y = np.vstack([y, self._y[:-1]])
             self._u = np.vstack([before, self._u[:-1]])
-            expected = self._unit * (self._A @ self._lifted + self._B @ before)[: len(y)]
-            self._disturbance = self._disturbance + self._gain * (y - expected - self._disturbance)
-        self._lifted = lifted = self._lift(self._y, self._u)
-        ahead = looked_ahead(reference, self._method.horizon)
-        parameters = np.concatenate([lifted, self._disturbance, ahead, before], axis=None)
+        lifted = self._lift(self._y, self._u)
+        if self._lifted is not None:
+            missed = lifted - self._A @ self._lifted - self._B @ before
+            self._missed = self._missed + self._gain * (missed - self._missed)
+        self._lifted = lifted
+        ahead = looked_ahead(reference, self.mpc.horizon)
+        parameters = np.concatenate([lifted, self._missed, ahead, before], axis=None)
         return self._program.inputs(parameters, self.info)[0]
 
     def predicted(self, tension: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import count as count_from
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,7 +9,7 @@ from scipy.linalg import cho_factor, cho_solve
 from ...campaign import Pilot, Study
 from ...model import Record, StateSpace, state_space_error
 from ...mpc import Controller, ControllerInfo, weight_matrix
-from ..lab import Lab, Method, believed, check_count, check_least
+from ..lab import Lab, Method, believed, check_least
 from ._weights import WeightSearch
 
 _BEFORE, _AFTER = 40, 200
@@ -20,31 +21,28 @@ class IterativeLearning(Method):
     r"""The same flight again and again, with the reference shifted by what the errors of those before say.
 
     Norm-optimal iterative learning control (Bristow, Tharayil, Alleyne, "A survey of iterative learning control", IEEE
-    Control Systems Magazine 26(3), 2006) about a tuned MPC. The shift c (T, p) changes by
+    Control Systems Magazine 26(3), 2006) about a tuned MPC. After flight k the shift c (T, p) changes by
 
-    .. math:: \arg\min_\Delta\; |e - T_y \Delta|_Q^2 + |w + T_w \Delta|_R^2 + \mu |\Delta|_Q^2,
+    .. math:: \arg\min_\Delta\; |e - T_y \Delta|_Q^2 + |w + T_w \Delta|_R^2 + k \mu |\Delta|_Q^2,
 
-    where e and w are errors and what the cost's R weighs of the inputs, means over some flights with the best shift so
-    far, and T says how the loop answers to a shift, by the MPC's model. Where that does not lower the mean J, mu is
-    made larger and the step shorter. What is learned is good for this one task alone.
+    where e is the flight's error, w what the cost's R weighs of its inputs, and T says how the loop answers to a shift,
+    by the MPC's model. Steps that shorten with k average the sensor's noise out (Saab, "A discrete-time stochastic
+    learning control algorithm", IEEE Trans. Automatic Control 46(6), 2001). What is learned is good for this one task
+    alone.
 
     Parameters
     ----------
     base
         Where the MPC comes from; nothing is learned before it is through.
-    flights
-        With each shift.
     caution
-        mu at first.
+        mu.
     """
 
     base: Method = field(default_factory=lambda: WeightSearch(flights=3, most=30))
-    flights: int = 3
-    caution: float = 3.0
+    caution: float = 1.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_count(1, flights=self.flights)
         check_least(0, caution=self.caution)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
@@ -53,34 +51,25 @@ class IterativeLearning(Method):
             yield controller
         if not isinstance(controller, Controller):
             return
-        study, mpc = lab.study, controller.mpc
+        study, mpc, model = lab.study, controller.mpc, believed(controller)
         count, p, m = study.task.samples(mpc.sample_time), mpc.outputs, mpc.inputs
-        to_y, to_u = _answers(controller, count)
-        scale = mpc.input_scale[:, None]
-        to_weighed = _weighed(study, np.zeros((m, count * p)), to_u.reshape(count, m, count * p))
+        scale, to_u = mpc.input_scale, _answers(controller, model, count)
+        to_y = _responses(model, count) @ to_u
+        of_shift = _weighed(study, np.zeros(m), to_u.reshape(count, m, -1) / scale[:, None])
         Q, R = (
             np.kron(np.eye(count), weight_matrix(weight, size, name))
             for weight, size, name in ((study.cost.Q, p, "Q of the cost"), (study.cost.R, m, "R of the cost"))
         )
-        curvature = to_y.T @ Q @ to_y + to_weighed.T @ R @ to_weighed
-        caution, least, best, downhill = self.caution, np.inf, np.zeros((count, p)), np.zeros(count * p)
-        shift = best
-        while True:
-            pilot = _Shifted(controller, shift)
-            episodes = [lab.fly(pilot) for _ in range(self.flights)]
-            costs = [np.inf if (J := lab.cost(episode)) is None else J for episode in episodes]
-            if (J := np.mean(costs)) < least:
-                least, best = J, shift
-                yield pilot
-                errors = [(episode.reference - episode.output)[1:].ravel() for episode in episodes]
-                held, used = (np.mean([getattr(e, n) for e in episodes], axis=0) for n in ("held", "tension"))
-                weighed = _weighed(study, held[:, None] / scale, used[:, :, None] / scale)[:, 0]
-                downhill = to_y.T @ Q @ np.mean(errors, axis=0) - to_weighed.T @ R @ weighed
-            elif least == np.inf:
+        curvature, shift = to_y.T @ Q @ to_y + of_shift.T @ R @ of_shift, np.zeros(count * p)
+        for k in count_from(1):
+            pilot = _Shifted(controller, shift.reshape(count, p))
+            flown = lab.fly(pilot)
+            if lab.cost(flown) is None:
                 return
-            else:
-                caution *= 3
-            shift = best + cho_solve(cho_factor(curvature + caution * Q), downhill).reshape(count, p)
+            yield pilot
+            of_flight = _weighed(study, flown.held / scale, flown.tension[:, :, None] / scale[:, None])[:, 0]
+            downhill = to_y.T @ Q @ (flown.reference - flown.output)[1:].ravel() - of_shift.T @ R @ of_flight
+            shift = shift + cho_solve(cho_factor(curvature + k * self.caution * Q), downhill)
 
 
 class _Shifted:
@@ -109,41 +98,45 @@ class _Shifted:
 
 
 def _weighed(study: Study, held: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """What the cost's R weighs (T m, K) of inputs (T, m, K), shares of u_max, the last before them ``held`` (m, K)."""
+    """What the cost's R weighs (T m, K) of inputs (T, m, K), shares of u_max, the last before them ``held`` (m,)."""
     match study.cost.input_term:
         case "rate":
-            inputs = np.diff(inputs, axis=0, prepend=held[None])
+            before = np.broadcast_to(held[:, None], inputs.shape[1:])
+            inputs = np.diff(inputs, axis=0, prepend=before[None])
         case "literal":
             inputs = inputs * study.mpc.input_scale[:, None]
     return inputs.reshape(-1, inputs.shape[2])
 
 
-def _answers(controller: Controller, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """How outputs (count p) and inputs as shares (count m) answer to a shift (count p), while no bound is active."""
-    mpc, model = controller.mpc, believed(controller)
+def _answers(controller: Controller, model: StateSpace, count: int) -> np.ndarray:
+    """How inputs (count m), N, answer to a shift (count p) in the loop with the model, while no bound is active."""
+    (A, B, C, D), mpc = model, controller.mpc
     p, m, size = mpc.outputs, mpc.inputs, 1e-3 * min(mpc.largest_output_bound, 1.0)
-    to_y, to_u = np.zeros((count, p, count, p)), np.zeros((count, m, count, p))
+    to_u = np.zeros((count, m, count, p))
     for i in range(p):
-        shift = np.zeros((_BEFORE + _AFTER, p))
+        shift, u = np.zeros((_BEFORE + _AFTER, p)), np.zeros((_BEFORE + _AFTER, m))
         shift[_BEFORE, i] = size
-        y, u = (answer / size for answer in _flown(_Shifted(controller, shift), model, len(shift)))
+        pilot, x, y = _Shifted(controller, shift), np.zeros(len(A)), np.zeros(p)
+        pilot.reset()
+        for k in range(len(shift)):
+            u[k] = pilot.step(y, np.zeros((mpc.reference_rows, p)))
+            x = A @ x + B @ u[k]
+            y = C @ x + D @ u[k]
         for k in range(count):
             # The loop looks ahead, so that it answers before the shift comes.
             rows = np.arange(max(k - _BEFORE, 0), min(k + _AFTER, count))
-            to_y[rows, :, k, i] = y[rows - k + _BEFORE]
-            to_u[rows, :, k, i] = u[rows - k + _BEFORE] / mpc.input_scale
-    return to_y.reshape(count * p, count * p), to_u.reshape(count * m, count * p)
+            to_u[rows, :, k, i] = u[rows - k + _BEFORE] / size
+    return to_u.reshape(count * m, count * p)
 
 
-def _flown(pilot: _Shifted, model: StateSpace, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Outputs (count, p) and inputs (count, m) of a flight on a linear model from rest, the reference zero."""
-    A, B, C, D = model
-    x, y, outputs, inputs = np.zeros(len(A)), np.zeros(len(C)), [], []
-    pilot.reset()
+def _responses(model: StateSpace, count: int) -> np.ndarray:
+    """How a linear model's outputs (count p) at the ends of samples depend on the inputs (count m) in them."""
+    (A, after, C, D), responses = model, []
+    (p, m), whole = D.shape, np.zeros((count, len(D), count, D.shape[1]))
     for _ in range(count):
-        u = pilot.step(y, np.zeros((pilot.mpc.reference_rows, len(C))))
-        x = A @ x + B @ u
-        y = C @ x + D @ u
-        outputs.append(y)
-        inputs.append(u)
-    return np.array(outputs), np.array(inputs)
+        responses.append(C @ after)
+        after = A @ after
+    responses[0] = responses[0] + D
+    for k in range(count):
+        whole[k:, :, k] = responses[: count - k]
+    return whole.reshape(count * p, count * m)

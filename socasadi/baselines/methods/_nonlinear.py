@@ -32,8 +32,6 @@ class NonlinearMPC(Method):
     model
         ``"rod"``, as it is known; ``"constant curvature"``, the same with one curvature about each axis along all of
         its length and nothing else.
-    horizon
-        Samples that are looked ahead.
     tuned
         Settings of the study's MPC that are tuned, as of :class:`LinearMPC`.
     doubt
@@ -44,14 +42,13 @@ class NonlinearMPC(Method):
     """
 
     model: Literal["rod", "constant curvature"] = "rod"
-    horizon: int = 20
     tuned: tuple = BESIDE_MODEL
     doubt: float = 0.01
     trials: int = 60
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_count(1, horizon=self.horizon, trials=self.trials)
+        check_count(1, trials=self.trials)
 
     @property
     def information(self) -> Information:
@@ -65,21 +62,21 @@ class NonlinearMPC(Method):
         # The rod takes the place of the model, so that nothing but the settings is left open.
         searched = replace(lab.study.mpc, model=Fixed.of(linearised(lab), plant.sample_time), tuned=self.tuned)
         first = [self.doubt if entry.name.startswith("input_noise") else 1.0 for entry in searched.entries]
-        build = partial(_Controller, plant=believed, advance=advance, method=self)
+        build = partial(_Controller, plant=believed, advance=advance)
         return tuned(lab, searched.entries, lambda x: build(searched.at(x)), initial=[first], most=self.trials)
 
 
 class _Controller(Law):
-    def __init__(self, mpc: LinearMPC, plant: SimulatedPlant, advance: ca.Function, method: NonlinearMPC) -> None:
+    def __init__(self, mpc: LinearMPC, plant: SimulatedPlant, advance: ca.Function) -> None:
         super().__init__(mpc)
-        self._rod, self._method, self._rest, self._advance = plant.rod, method, plant.sensor, Buffered(advance)
+        self._rod, self._rest, self._advance = plant.rod, plant.sensor, Buffered(advance)
         self.begin()
 
     def begin(self) -> None:
         order, p = 2 * self._rod.dof, self.mpc.outputs
         self._x = self._rod.equilibrium(self.held).state
         self._disturbance = np.zeros(p)
-        self._planned = np.tile(self.held, (self._method.horizon, 1))
+        self._planned = np.tile(self.held, (self.mpc.horizon, 1))
         # It rests where it is thought to rest, but for what the model gets wrong.
         self._covariance = np.diag(np.concatenate([np.full(order, 1e-10), np.full(p, 1e-4)]))
         self._first = True
@@ -87,9 +84,9 @@ class _Controller(Law):
     def act(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
         self._estimate(y)
         self._planned = np.vstack([self._planned[1:], self._planned[-1:]])
-        self._planned = self._improved(looked_ahead(reference, self._method.horizon))
+        self._planned = self._improved(looked_ahead(reference, self.mpc.horizon))
         if not np.isfinite(self._planned).all():
-            self._planned = np.tile(self.held, (self._method.horizon, 1))
+            self._planned = np.tile(self.held, (self.mpc.horizon, 1))
             return np.full(self.mpc.inputs, np.nan)
         return self._planned[0]
 
@@ -129,7 +126,7 @@ class _Controller(Law):
 
     def _improved(self, wanted: np.ndarray) -> np.ndarray:
         """The plan (N, m) after one more program, about the flight that the present one gives."""
-        N, (p, m), scale = self._method.horizon, (self.mpc.outputs, self.mpc.inputs), self.mpc.input_scale
+        N, (p, m), scale = self.mpc.horizon, (self.mpc.outputs, self.mpc.inputs), self.mpc.input_scale
         x, by_plan = self._x, np.zeros((len(self._x), N * m))
         expected, slopes = np.zeros((N, p)), np.zeros((N, p, N * m))
         for k, u in enumerate(self._planned):

@@ -6,17 +6,17 @@ import numpy as np
 from ...campaign import Pilot
 from ...model import Entry, subspace
 from ...mpc import LinearMPC
-from ..lab import Allocation, Lab, Law, Method, check_least, static_gain, tuned
+from ..lab import FORESIGHT, Allocation, Foresight, Lab, Law, Method, check_least, static_gain, tuned
 
 
 @dataclass(frozen=True)
 class PID(Method):
     r"""Three terms per output through the inverse static Jacobian, which an identified model gives:
 
-    .. math:: u = G^+ (f r + k_p e + k_i \int e\, dt + k_d \dot e_f)
+    .. math:: u = G^+ (f r_a + k_p e + k_i \int e\, dt + k_d \dot e_f)
 
-    with the error's derivative filtered, or the inputs within the bounds that come nearest to it at rest. It sees the
-    reference of the next sample, and no further. The five numbers are tuned by flights.
+    with the error's derivative filtered, or the inputs within the bounds that come nearest to it at rest. What is fed
+    forward is the reference some samples ahead, smoothed. The seven numbers are tuned by flights.
 
     Parameters
     ----------
@@ -38,20 +38,21 @@ class PID(Method):
             Entry("derivative", "s", 0.001, 2.0, "log"),
             Entry("filter", "s", 0.01, 1.0, "log"),
             Entry("fed forward", "1", 0.0, 1.0),
+            *FORESIGHT,
         )
-        mpc = lab.study.mpc
-        return tuned(
-            lab, knobs, lambda gains: _Controller(mpc, allocation, gains), initial=[(0.1, 1.0, 0.05, 0.1, 1.0)]
-        )
+        mpc, first = lab.study.mpc, (0.1, 1.0, 0.05, 0.1, 1.0, 0.5, 0.05)
+        return tuned(lab, knobs, lambda gains: _Controller(mpc, allocation, gains), initial=[first])
 
 
 class _Controller(Law):
     def __init__(self, mpc: LinearMPC, allocation: Allocation, gains: np.ndarray) -> None:
         super().__init__(mpc)
-        self._allocation, self._gains = allocation, gains
+        self._allocation, self._gains = allocation, gains[:5]
+        self._foresight = Foresight(mpc.sample_time, *gains[5:])
         self.begin()
 
     def begin(self) -> None:
+        self._foresight.begin()
         self._integral, self._slope = np.zeros(self.mpc.outputs), np.zeros(self.mpc.outputs)
         self._error: np.ndarray | None = None
 
@@ -62,7 +63,7 @@ class _Controller(Law):
             smooth = time / (time + filtered)
             self._slope = self._slope + smooth * ((error - self._error) / time - self._slope)
         self._error = error
-        known = forward * reference[0] + proportional * error + derivative * self._slope
+        known = forward * self._foresight.ahead(y, reference) + proportional * error + derivative * self._slope
         summed = self._integral + time * error
         u, missed = self._allocation.inputs(known + integral * summed, self.allowed)
         # The integral of an output that bounds keep from going further waits, lest it winds up.

@@ -8,7 +8,7 @@ from scipy.linalg import solve_continuous_are
 from ...campaign import Pilot
 from ...model import Entry, StateSpace, subspace
 from ...mpc import DesignError, LinearMPC
-from ..lab import Allocation, Lab, Law, Method, check_least, static_gain, tuned
+from ..lab import FORESIGHT, Allocation, Foresight, Lab, Law, Method, check_least, static_gain, tuned
 
 _ABOVE_LEAST = 1.1
 """gamma of the controller, as a factor on the least that there is."""
@@ -23,8 +23,8 @@ class HInfinity(Method):
     The plant, shaped by :math:`W = k (s + w) / s` in each channel, gets the controller that is the most robust against
     perturbations of its normalised coprime factors (McFarlane, Glover, "A loop-shaping design procedure using
     H-infinity synthesis", IEEE Trans. Automatic Control 37, 1992; formulas of Skogestad, Postlethwaite, "Multivariable
-    feedback control", 2005, section 9.4). It sees the reference of the next sample, and no further. The gain k, the
-    corner w and a share of the reference that is fed forward are tuned by flights.
+    feedback control", 2005, section 9.4). The gain k, the corner w, and what is fed forward are tuned by flights: a
+    share of the reference, how many samples ahead, and how smooth.
 
     Parameters
     ----------
@@ -45,15 +45,24 @@ class HInfinity(Method):
             Entry("gain", "1", 0.03, 30.0, "log"),
             Entry("corner", "rad/s", 0.1, 30.0, "log"),
             Entry("fed forward", "1", 0.0, 1.0),
+            *FORESIGHT,
         )
-        return tuned(lab, knobs, lambda x: _Controller(mpc, model, allocation, *x), initial=[(0.3, 2.0, 1.0)])
+        first = (0.3, 2.0, 1.0, 0.5, 0.05)
+        return tuned(lab, knobs, lambda x: _Controller(mpc, model, allocation, *x), initial=[first])
 
 
 class _Controller(Law):
-    """v = forward r + W (K y - K(0) r), u = inverse v, where y - forward r is what is left to do."""
+    """v = forward r_a + W (K (y - forward r) - (1 - forward) K(0) r), u = inverse v; r_a is r ahead, smoothed."""
 
     def __init__(
-        self, mpc: LinearMPC, model: StateSpace, allocation: Allocation, gain: float, corner: float, forward: float
+        self,
+        mpc: LinearMPC,
+        model: StateSpace,
+        allocation: Allocation,
+        gain: float,
+        corner: float,
+        forward: float,
+        *ahead: float,
     ) -> None:
         super().__init__(mpc)
         p, one = mpc.outputs, np.eye(mpc.outputs)
@@ -62,12 +71,13 @@ class _Controller(Law):
         plant = _in_tustins_variable(model, allocation.inverse, mpc.sample_time)
         robust = _most_robust(_series(plant, shaper))
         self._static = robust.D - robust.C @ np.linalg.solve(robust.A, robust.B)
-        self._allocation, self._forward = allocation, forward
+        self._allocation, self._forward, self._foresight = allocation, forward, Foresight(mpc.sample_time, *ahead)
         self._robust, self._shaper = _sampled(robust, mpc.sample_time), _sampled(shaper, mpc.sample_time)
         self._sizes = len(robust.A), p
         self.begin()
 
     def begin(self) -> None:
+        self._foresight.begin()
         self._x, self._integral = (np.zeros(size) for size in self._sizes)
 
     def act(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
@@ -75,7 +85,7 @@ class _Controller(Law):
         wanted = reference[0]
         left = y - self._forward * wanted
         answer = robust.C @ self._x + robust.D @ left - (1 - self._forward) * self._static @ wanted
-        v = self._forward * wanted + shaper.C @ self._integral + shaper.D @ answer
+        v = self._forward * self._foresight.ahead(y, reference) + shaper.C @ self._integral + shaper.D @ answer
         u, missed = self._allocation.inputs(v, self.allowed)
         self._x = robust.A @ self._x + robust.B @ left
         # The integral of an output that bounds keep from going further waits, lest it winds up.
