@@ -24,11 +24,12 @@ from socasadi.baselines import (
     worth,
 )
 from socasadi.baselines.lab import Allocation, Foresight, believed, static_gain
-from socasadi.baselines.methods import _deepc, _koopman, _learning
+from socasadi.baselines.methods import _deepc, _koopman, _learning, _nonlinear
 from socasadi.baselines.methods._h_infinity import _in_tustins_variable, _most_robust
 from socasadi.baselines.methods._sampled import sampled
 from socasadi.campaign import probe
 from socasadi.codegen import c_compiler
+from socasadi.codegen import compiled as code
 from socasadi.model import StateSpace, state_space_error, subspace
 
 compiled = pytest.mark.skipif(c_compiler() is None, reason="its program is solved in C")
@@ -392,6 +393,16 @@ def test_near_rest_the_nonlinear_mpc_does_what_the_one_on_the_linearisation_does
     flown = [worth(replace(made, task=task), pilot, 1)[0] for pilot in (nonlinear, linear)]
     assert flown[0].J[0] == pytest.approx(flown[1].J[0], rel=0.1)
     assert flown[0].settled < 1.5e-3
+
+
+@compiled
+def test_with_finer_steps_of_integration_the_nonlinear_mpc_flies_no_better():
+    made, costs = rod_study(Q=1e3, R=1.0), []
+    mpc, plant = replace(made.mpc, tuned=("input_noise",)).at([*THETA, 1e-3]), made.plant
+    for steps in (1, 5):
+        pilot = _nonlinear._Controller(mpc, plant, code(sampled(plant, 3, steps)))
+        costs.append(worth(made, pilot, 1)[0].J[0])
+    assert costs[0] == pytest.approx(costs[1], rel=1e-3)
 
 
 def test_what_needs_a_rod_says_so():
