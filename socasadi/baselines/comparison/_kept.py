@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 
-def stored_cells(folder: Path) -> Iterator[dict[str, Any]]:
+def stored_cells(folder: str | Path) -> Iterator[dict[str, Any]]:
     """The cells that a folder holds, in the order in which they were done; what is no cell is left out."""
     try:
-        lines = _file(folder).read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = _file(Path(folder)).read_text(encoding="utf-8", errors="replace").splitlines()
     except FileNotFoundError:
         return
     for line in lines:

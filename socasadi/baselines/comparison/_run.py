@@ -18,7 +18,7 @@ _LOSSES = 2
 """Times that a cell is flown again when its worker has died."""
 
 
-def load_comparison(script: Path, size: Size = "full") -> Comparison:
+def load_comparison(script: str | Path, size: Size = "full") -> Comparison:
     """The ``comparison`` that a script defines, in a size.
 
     Raises
@@ -26,7 +26,7 @@ def load_comparison(script: Path, size: Size = "full") -> Comparison:
     RunError
         There is no such file, it breaks off (the message says where), or it defines no comparison.
     """
-    found = load_script(script).get("comparison")
+    found = load_script(Path(script)).get("comparison")
     if not isinstance(found, Comparison):
         raise RunError(f"{script} defines no `comparison`: let it make one, comparison = Comparison(study=..., ...)")
     return found.of_size(size)
@@ -34,10 +34,10 @@ def load_comparison(script: Path, size: Size = "full") -> Comparison:
 
 def order_cell(script: str, size: Size, task: str, method: str, seed: int) -> str:
     """:func:`fly_cell` in another process, which runs the script again; JSON."""
-    return json.dumps(fly_cell(load_comparison(Path(script), size), task, method, seed))
+    return json.dumps(fly_cell(load_comparison(script, size), task, method, seed))
 
 
-def fitting_cells(comparison: Comparison, folder: Path) -> list[dict[str, Any]]:
+def fitting_cells(comparison: Comparison, folder: str | Path) -> list[dict[str, Any]]:
     """The cells in a folder that were flown under the settings of a comparison; of several alike the last."""
     known = {(cell["task"], cell["method"], cell["seed"], cell["digest"]): cell for cell in stored_cells(folder)}
     keys = [(*names, comparison.digest(*names)) for names in comparison.cells]
@@ -45,9 +45,9 @@ def fitting_cells(comparison: Comparison, folder: Path) -> list[dict[str, Any]]:
 
 
 def run_comparison(
-    script: Path,
+    script: str | Path,
     size: Size,
-    folder: Path,
+    folder: str | Path,
     executor: Executor,
     progress: Callable[[dict[str, Any], int, int], None] = lambda cell, done, total: None,
     *,
@@ -73,6 +73,7 @@ def run_comparison(
     RunError
         Another robot cannot be made, no worker can fly a cell, or they die of one; what was done is stored.
     """
+    script, folder = Path(script), Path(folder)
     comparison = load_comparison(script, size).of_parts(tasks, methods, seeds)
     digests = {names: comparison.digest(*names) for names in comparison.cells}  # of the script as it is now
     folder.mkdir(parents=True, exist_ok=True)  # what cannot be kept is not worth flying

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .._study import Study
 
 
-def load_study(script: Path) -> "Study":
+def load_study(script: str | Path) -> "Study":
     """The ``study`` that ``script`` defines.
 
     Raises
@@ -22,6 +22,7 @@ def load_study(script: Path) -> "Study":
     """
     from .._study import Study
 
+    script = Path(script)
     if script.is_file() and script.suffix != ".py":
         raise RunError(f"{script} is no Python file (.py); name the one that defines the study")
     study = load_script(script).get("study")
