@@ -33,7 +33,7 @@ def compare(
     folder: Annotated[Path | None, typer.Option("--out", help="Its results; runs/NAME-SIZE by default.")] = None,
 ) -> None:
     """Compare ways to get a controller at equal cost. A stopped comparison goes on when it is given again."""
-    from .baselines import Summary, fitting_cells, load_comparison, run_comparison, summary_table
+    from .baselines import Summary, fitting_cells, load_comparison, run_comparison, stored_cells, summary_table
     from .report import comparison_figures, save_figures  # matplotlib takes its time
 
     if smoke and quick:
@@ -45,7 +45,14 @@ def compare(
     full = load_comparison(script)
     whole = full.of_size(size)
     folder = folder or Path("runs") / f"{script.stem}-{size}"
-    out.print(f"{script}, {size}: {whole.of_parts(**parts).extent} for each method, into {folder}")
+    part = whole.of_parts(**parts)
+    out.print(f"{script}, {size}: {part.extent} for each method, into {folder}")
+    there = sum(not cell["broke"] for cell in fitting_cells(part, folder))
+    known = {whole.digest(*names) for names in whole.cells}
+    strange = sum(cell["digest"] not in known for cell in stored_cells(folder))
+    if there or strange:
+        others = f"; {strange} that were flown under other settings are left aside" if strange else ""
+        out.print(f"{there} of {len(part.cells)} cells are there{others}")
     began, first = time.monotonic(), [0]
 
     def told(cell: dict[str, Any], done: int, total: int) -> None:
@@ -67,7 +74,9 @@ def compare(
     flown = {cell[kind] for cell in cells for kind in ("task", "method")}
     summary = Summary.of(cells, *([name for name in names if name in flown] for names in (whole.tasks, whole.methods)))
     rows = summary_table(summary)
-    hidden = ("task", "knows", "seeds", "p99 / us", "while tuned")  # which the file has
+    for old in (*folder.glob("against.csv"), *folder.glob("elsewhere-*.csv"), *folder.glob("figures/*.p[dn][fg]")):
+        old.unlink()  # of another part, perhaps
+    hidden = ("task", "knows", "seeds", "p99 / us", "while tuned", "broke")  # which the file has
     for task in summary.tasks:
         shown = [{k: v for k, v in row.items() if k not in hidden} for row in rows if row["task"] == task]
         title = f"\n{task}, after {summary.checkpoints[-1]} episodes' worth of the robot's time:"
@@ -88,8 +97,14 @@ def compare(
     for cell in cells:
         if cell["broke"]:
             out.print(f"broke off: {_line(cell)}")
+        elif cell["lacking"]:
+            out.print(_line(cell))
         elif why := next((point["failure"] for point in cell["points"] if point and point["failure"]), None):
             out.print(f"failed: {cell['task']}, {cell['method']}, seed {cell['seed']}: {why}")
+        elif held := sum(point["fallbacks"] for point in cell["points"][-1:] if point):
+            out.print(f"held its last input in {held} samples: {_line(cell)}")
+    if any(cell["broke"] for cell in cells):
+        raise typer.Exit(1)
 
 
 def _written(size: str, rows: list[dict[str, str]], file: Path) -> Path:
@@ -106,7 +121,7 @@ def _line(cell: dict[str, Any]) -> str:
         return f"{name}: {cell['broke']}"
     last = cell["points"][-1]
     if last is None:
-        return f"{name}: no controller within its time"
+        return f"{name}: no controller within its time: {cell['lacking']}"
     J = [np.inf if value is None else value for value in last["J"]]
     return f"{name}: J = {np.median(J):.4g} after {last['spent']:.0f} s of the robot's time"
 

@@ -44,7 +44,8 @@ def comparison_figures(summary: Summary, comparison: Comparison, size: Size) -> 
     factor, unit = Units.of(comparison.study.plant).shown
     shown = [name for name in summary.methods if name in (comparison.shown or _spread(summary))]
     with matplotlib.rc_context(SETTINGS):
-        rmse = "RMSE after 5 s"
+        short = all(comparison.of(task, comparison.seeds[0]).task.duration <= 5 for task in summary.tasks)
+        rmse = "RMSE" if short else "RMSE after 5 s"
         drawn = {
             "cost": _over_time(summary, comparison, shown, "J", 1.0, "J", _HIGHEST, note),
             "rmse": _over_time(summary, comparison, shown, "rmse", factor, f"{rmse} / {unit}", _HIGHEST_RMSE, note),

@@ -1,6 +1,8 @@
 import importlib.metadata
 import time
+import traceback
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,9 +10,10 @@ from threadpoolctl import threadpool_limits
 
 from ...campaign import Pilot, Study
 from ...mpc import LinearMPC
-from ..lab import BudgetSpent, Lab
+from ..lab import BudgetSpent, Lab, offers_of
 from ._comparison import Comparison
 from ._judge import open_loop_error, worth, worth_elsewhere
+from ._own import is_own
 
 
 def fly_cell(comparison: Comparison, task: str, method: str, seed: int) -> dict[str, Any]:
@@ -26,17 +29,17 @@ def _flown(comparison: Comparison, task: str, method: str, seed: int) -> dict[st
     study, began, digest = comparison.of(task, seed), time.perf_counter(), comparison.digest(task, method, seed)
     seconds = [at * study.task.duration for at in comparison.checkpoints]
     lab = Lab(study, seconds, known=comparison.study.plant)
-    offers, broke = {}, None
+    offers, broke, lacking = {}, None, "it offered none"
     try:
-        for pilot in comparison.methods[method].offers(lab):
-            _check_offer(pilot, offers.get(seconds[-1]))
+        for pilot in offers_of(comparison.methods[method], lab):
+            _check_offer(pilot, study, offers.get(seconds[-1]))
             offers |= {at: (pilot, lab.spent) for at in seconds if at >= lab.spent - 1e-9}
-    except BudgetSpent:
-        pass
+    except BudgetSpent as error:
+        lacking = str(error)
     except ModuleNotFoundError:  # of the machine, not of the method
         raise
     except Exception as error:  # a method that cannot is a result; the others go on
-        broke = f"{type(error).__name__}: {error}"
+        broke = _told(error)
     points, path, elsewhere, open_loop = [None] * len(seconds), np.zeros((0, study.mpc.outputs)), {}, np.nan
     try:
         points, path = _judged(study, [offers.get(at) for at in seconds], comparison.flights)
@@ -48,7 +51,7 @@ def _flown(comparison: Comparison, task: str, method: str, seed: int) -> dict[st
     except ModuleNotFoundError:
         raise
     except Exception as error:
-        broke = broke or f"{type(error).__name__}: {error}"
+        broke = broke or _told(error)
     cell = {
         "digest": digest,
         "task": task,
@@ -65,22 +68,39 @@ def _flown(comparison: Comparison, task: str, method: str, seed: int) -> dict[st
         "failed": lab.failed,
         "spent": lab.spent,
         "broke": broke,
+        "lacking": None if offers else lab.failures or lacking,
         "wall": time.perf_counter() - began,
         "version": importlib.metadata.version("socasadi"),
     }
     return _finite(cell)
 
 
-def _check_offer(pilot: Any, last: tuple[Pilot, float] | None) -> None:
+def _told(error: Exception) -> str:
+    """What went wrong, and where in files of one's own."""
+    own = [frame for frame in traceback.extract_tb(error.__traceback__) if is_own(frame.filename)]
+    place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
+    return f"{type(error).__name__}: {error}{place}"
+
+
+def _check_offer(pilot: Any, study: Study, last: tuple[Pilot, float] | None) -> None:
     lacks = [name for name in ("mpc", "info", "reset", "step") if not hasattr(pilot, name)]
     if lacks or not isinstance(pilot.mpc, LinearMPC):
         raise TypeError(
-            f"offers yields controllers, which have {', '.join(lacks) or 'a LinearMPC as mpc'}; not {pilot!r}"
+            f"offers yields controllers, which have {', '.join(lacks) or 'a LinearMPC as mpc'}; not {_short(pilot)}"
+        )
+    if pilot.mpc.sample_time != study.mpc.sample_time:
+        raise ValueError(
+            f"a controller has samples of {pilot.mpc.sample_time:g} s, the study {study.mpc.sample_time:g} s"
         )
     if last is not None and pilot is last[0]:
         raise TypeError(
             "offers yields the same controller twice: make a new one each time, for an earlier checkpoint has the first"
         )
+
+
+def _short(value: Any) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def _judged(

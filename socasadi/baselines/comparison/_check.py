@@ -18,7 +18,9 @@ def check_comparison(comparison: "Comparison") -> None:
             raise TypeError(f"{what}s are a dictionary, at least one {what} by its name, not {named!r}")
         for name, value in named.items():
             if not isinstance(value, kinds):
-                raise TypeError(f"the {what} {name!r} is a {what.capitalize()}, not {value!r}")
+                raise TypeError(
+                    f"{value!r} is given as the {what} {name!r}; an instance of {what.capitalize()} is needed"
+                )
     for name in comparison.tasks:
         if not isinstance(name, str) or not name or set(name) & set("/\\"):
             raise ValueError(f"the task {name!r} gives files their names: it is not empty and without slashes")

@@ -13,8 +13,8 @@ from ._own import own_code
 
 Size = Literal["smoke", "quick", "full"]
 
-_SCHEMA = 2
-"""Raised when what a cell holds is reckoned in another way, or what every method is given: all are flown again."""
+_SCHEMA = 3
+"""Raised when a method of the package, or what a cell holds, is reckoned in another way: all are flown again."""
 _SMOKE = 5.0
 """s of a flight, at most, of the smallest size."""
 _NO_LIMIT = 1e8
@@ -101,7 +101,7 @@ class Comparison:
         """
         count = len(self.seeds) if seeds is None else seeds
         if not 1 <= count <= len(self.seeds):
-            raise ValueError(f"there are {len(self.seeds)} seeds, of which the first {count} cannot be taken")
+            raise ValueError(f"the first {count} seeds are asked for, of {len(self.seeds)} that there are in this size")
         for kind, names, known in (("task", tasks, self.tasks), ("method", methods, self.methods)):
             if unknown := [name for name in names if name not in known]:
                 raise ValueError(f"there is no {kind} {unknown[0]!r}; there are {', '.join(known)}")

@@ -36,6 +36,11 @@ def own_code(value: Any) -> str | None:
     return hashlib.sha256(repr(sorted(told)).encode()).hexdigest()[:16] if told else None
 
 
+def is_own(file: str) -> bool:
+    """Whether a file is neither the package's nor a library's."""
+    return not file.startswith(_NOT_OWN)
+
+
 def _made_of(value: Any, seen: dict[int, Any]) -> Iterator[FunctionType | type]:
     """Functions and classes in an object and its parts."""
     if value is None or isinstance(value, bool | int | float | complex | str | bytes) or id(value) in seen:
@@ -75,7 +80,7 @@ def _file(thing: FunctionType | type) -> Path | None:
     """The file of one's own in which a function, or the first method of a class, stands."""
     inner = [thing] if isinstance(thing, FunctionType) else [getattr(m, "fget", m) for m in vars(thing).values()]
     files = (function.__code__.co_filename for function in inner if isinstance(function, FunctionType))
-    file = next((Path(name) for name in files if not name.startswith(_NOT_OWN)), None)
+    file = next((Path(name) for name in files if is_own(name)), None)
     return file if file is not None and file.is_file() else None
 
 

@@ -110,13 +110,15 @@ def run_comparison(
                     if losses[names] > _LOSSES:
                         raise RunError(f"{name}: its workers die ({error})") from error
                     send(names)
+                except ModuleNotFoundError as error:
+                    raise RunError(f"{name}: {error}; or leave the method out. What was done is stored") from error
                 except Exception as error:
                     raise RunError(f"{name}: {error}") from error
                 else:
                     if cell["digest"] != digests[names]:
                         raise RunError(
-                            f"{name}: a worker knows another {script.name}, which was edited, or the worker is older: "
-                            "restart the workers, and give the command again"
+                            f"{name}: {script.name}, or what it imports, was edited while it was flown, or a worker is "
+                            "older: give the command again, after a restart of workers of your own"
                         )
                     store_cell(folder, cell)
                     cells.append(cell)

@@ -108,7 +108,8 @@ class Summary:
                 for name in (first, method)
                 for values in [self.values(task, name, "J", checkpoint)]
             )
-            if not (both := [seed for seed in ours if seed in theirs]):
+            both = [seed for seed in ours if seed in theirs and np.isfinite(min(ours[seed], theirs[seed]))]
+            if not both:
                 continue
             tasks += 1
             won += bool(np.median([ours[s] for s in both]) <= np.median([theirs[s] for s in both]))
@@ -148,8 +149,8 @@ def _quartiles(values: np.ndarray) -> tuple[float, float, float]:
 
 
 def _log_quotient(a: float, b: float) -> float:
-    """Of two J, within bounds where one of them is infinite; 0 where both are."""
-    return 0.0 if np.isinf(a) and np.isinf(b) else float(np.clip(np.log(a) - np.log(b), -50, 50))
+    """Of two J, within bounds where one of them is infinite."""
+    return float(np.clip(np.log(a) - np.log(b), -50, 50))
 
 
 def summary_table(summary: Summary, checkpoint: int = -1) -> list[dict[str, str]]:
@@ -191,6 +192,7 @@ def summary_table(summary: Summary, checkpoint: int = -1) -> list[dict[str, str]
                     "max / us": steps[2],
                     "failed": f"{sum(J is None for J in flown)} of {len(flown)}",
                     "while tuned": f"{sum(c['failed'] for c in cells)} of {sum(c['flights'] for c in cells)}",
+                    "broke": f"{sum(bool(c['broke']) for c in cells)} of {len(cells)}",
                     "open loop / mm": _open_loop(cells),
                 }
             )

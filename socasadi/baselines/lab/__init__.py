@@ -2,9 +2,10 @@
 
 from ._allocation import Allocation
 from ._foresight import FORESIGHT, Foresight
+from ._kept import Kept
 from ._lab import BudgetSpent, Lab, check_lent
 from ._law import Forecast, Law, Program, looked_ahead
-from ._method import Information, Method
+from ._method import Information, Method, offers_of
 from ._models import believed, identified, static_gain
 from ._settings import check_count, check_least
 from ._tuned import BESIDE_MODEL, tuned
@@ -17,6 +18,7 @@ __all__ = [
     "Forecast",
     "Foresight",
     "Information",
+    "Kept",
     "Lab",
     "Law",
     "Method",
@@ -27,6 +29,7 @@ __all__ = [
     "check_lent",
     "identified",
     "looked_ahead",
+    "offers_of",
     "static_gain",
     "tuned",
 ]

@@ -6,6 +6,7 @@ import numpy as np
 from ...campaign import Episode, Pilot, Stream, Study, Task, drawn_seed, fly_once, probe
 from ...model import Record
 from ...plant import Plant
+from ._kept import Kept
 
 _ROUNDING = 1e-9
 
@@ -37,6 +38,8 @@ class Lab:
         Experiments so far: of controllers, without one, and those of the former that failed.
     numbered
         The highest number of a flight so far; its noise depends on it.
+    failure
+        Why the first flight that failed did; None if none did.
 
     Raises
     ------
@@ -52,6 +55,14 @@ class Lab:
         check_lent(study)
         self.spent = 0.0
         self.flights = self.probes = self.failed = self.numbered = 0
+        self.failure: str | None = None
+
+    @property
+    def failures(self) -> str | None:
+        """How many flights failed, and why the first; None if none did."""
+        if self.failure is None:
+            return None
+        return f"{self.failed} of {self.flights} flights failed, the first by {self.failure}"
 
     def due(self, flights: int = 1) -> bool:
         """Whether so many more flights may pass a checkpoint: who has a controller to offer should do so now."""
@@ -88,7 +99,7 @@ class Lab:
         plant: Plant | None = None,
         task: Task | None = None,
     ) -> Episode:
-        """One experiment with a controller.
+        """One experiment with a controller, which fails where an input leaves the bounds of the study's MPC.
 
         Parameters
         ----------
@@ -110,10 +121,11 @@ class Lab:
         self.flights += 1
         number = self.numbered + 1 if number is None else number
         self.numbered = max(self.numbered, number)
-        episode = fly_once(study, pilot, (Stream.TRIAL, number), give_up)
+        episode = fly_once(study, Kept(pilot, study.mpc), (Stream.TRIAL, number), give_up)
         # Where not even the first sample came, the robot was occupied all the same.
         self.spent += max(len(episode.tension), 1) * episode.sample_time
         self.failed += episode.failure is not None
+        self.failure = self.failure or episode.failure
         return episode
 
     def records(self, pilot: Pilot, flights: int) -> list[Record]:

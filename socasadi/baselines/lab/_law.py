@@ -37,6 +37,10 @@ class Law(ABC):
     def step(self, y: ArrayLike, reference: ArrayLike, disturbance: ArrayLike | None = None) -> np.ndarray:
         """Inputs (m,), N, for the coming sample; y (p,) and reference (P, p) as of :class:`Controller`."""
         wanted = self.act(np.asarray(y, dtype=float), np.atleast_2d(np.asarray(reference, dtype=float)))
+        if np.shape(wanted) != (self.mpc.inputs,):
+            raise ValueError(
+                f"act gave {wanted!r} for the inputs, of shape {np.shape(wanted)}; ({self.mpc.inputs},) is needed"
+            )
         self.info.steps += 1
         if not np.isfinite(wanted).all():
             self.info.held += 1

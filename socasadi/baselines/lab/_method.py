@@ -57,9 +57,21 @@ class Method(ABC):
         why = "its time was enough for all that it does"
         try:
             with threadpool_limits(1):  # its matrices are small: threads would wait for each other
-                offered.extend(self.offers(lab))
+                offered.extend(offers_of(self, lab))
         except BudgetSpent as error:
             why = str(error)
         if not offered:
+            why = lab.failures or why
             raise BudgetSpent(f"{type(self).__name__} has no controller to offer: {why}")
         return offered[-1]
+
+
+def offers_of(method: Method, lab: Lab) -> Iterator[Pilot]:
+    """What a method offers; TypeError if its ``offers`` is no generator."""
+    offered = method.offers(lab)
+    if not isinstance(offered, Iterator):
+        raise TypeError(
+            f"offers of {type(method).__name__} returned {type(offered).__name__}: let it yield controllers, "
+            "or return an iterator of them, such as tuned(...)"
+        )
+    return offered

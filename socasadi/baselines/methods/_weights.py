@@ -63,6 +63,10 @@ class WeightSearch(Method):
             check_count(1, most=self.most)
         if not isinstance(self.over, tuple):
             raise TypeError(f"over is a tuple of functions that make another robot of a plant, not {self.over!r}")
+        if strange := [other for other in self.over if not callable(other)]:
+            raise TypeError(
+                f"over holds functions that make another robot of a plant, such as Softer, not {strange[0]!r}"
+            )
         if self.flights and self.model == "linearised":
             raise ValueError(
                 f"flights={self.flights}: the linearised rod takes 0, only a probed model is fitted to them"
