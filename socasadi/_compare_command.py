@@ -136,7 +136,7 @@ def _rivals(summary: Any) -> list[dict[str, str]]:
             low, middle, high = (f"{100 * share:+.1f}" if share < 10 else "far" for share in rivalry.excess)
             rows.setdefault(method, {"method": method, "knows": knows})
             rows[method] |= {
-                f"its J not lower on, at {points}": f"{rivalry.won} of {rivalry.tasks}",
+                f"{summary.methods[0]} at or below, at {points}": f"{rivalry.won} of {rivalry.tasks}",
                 f"higher by %, at {points}": f"{middle} ({low} to {high})",
                 f"p, at {points}": f"{rivalry.p:.2g}" if np.isfinite(rivalry.p) else "-",
             }

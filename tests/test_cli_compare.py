@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from command_support import socasadi
 
-from socasadi.baselines import Summary, fitting_cells, load_comparison, stored_cells, summary_table
+from socasadi.baselines import load_comparison, stored_cells
 from socasadi.codegen import c_compiler
 
 NOTHING = """
@@ -103,6 +103,42 @@ def test_a_method_that_has_nothing_to_offer_is_told_as_that(tmp_path):
     assert (tmp_path / "runs" / "script-full" / "figures" / "cost.png").exists()
 
 
+BROKEN = """
+from socasadi import Circle, LinearMPC, Modal, Rod, SimulatedPlant, Study
+from socasadi.baselines import Comparison, Linearised, Method
+
+class Broken(Method):
+    def offers(self, lab):
+        yield 1 / 0
+
+study = Study(plant=SimulatedPlant(Rod.preset("paper")), mpc=LinearMPC(Modal()), task=Circle(duration=1.0))
+comparison = Comparison(
+    study=study,
+    tasks={"circle": study.task},
+    methods={"linearised": Linearised(), "broken": Broken()},
+    seeds=(0,),
+    checkpoints=(1,),
+    flights=1,
+)
+"""
+
+
+def test_what_is_there_is_told_first_what_broke_at_last_and_nothing_stays_of_a_comparison_before(tmp_path):
+    (script := tmp_path / "script.py").write_text(BROKEN)
+    done, folder = compare("script.py", "--jobs", "1", cwd=tmp_path), tmp_path / "runs" / "script-full"
+    assert done.returncode == 1
+    assert "broke off: circle, broken, seed 0: ZeroDivisionError: division by zero (script.py, line 7)" in done.stdout
+    assert "are there" not in done.stdout
+    assert (folder / "against.csv").exists()
+    with (folder / "table.csv").open() as file:
+        assert [row["broke"] for row in csv.DictReader(file)] == ["0 of 1", "1 of 1"]
+    script.write_text(BROKEN.replace(', "broken": Broken()', ""))
+    again = compare("script.py", "--jobs", "1", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert "1 of 1 cells are there; 1 that were flown under other settings are left aside" in again.stdout
+    assert not (folder / "against.csv").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [
@@ -117,16 +153,3 @@ def test_a_slip_is_answered_in_a_sentence(tmp_path, arguments, fault):
     assert done.returncode == 1
     assert fault in done.stderr
     assert "Traceback" not in done.stderr
-
-
-def test_what_is_committed_was_flown_under_the_settings_that_are_committed():
-    """Every stored cell is one of the comparison as it stands, whole seeds of it, and the table is made of them."""
-    results = ROOT / "studies" / "results" / "compare"
-    comparison, stored = load_comparison(ROOT / "studies" / "compare.py"), list(stored_cells(results))
-    seeds = sorted({cell["seed"] for cell in stored})
-    flown = comparison.of_parts(seeds=len(seeds))
-    assert len(fitting_cells(flown, results)) == len(flown.cells) == len(stored)
-    with (results / "table.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    made = summary_table(Summary.of(stored, list(comparison.tasks), list(comparison.methods)))
-    assert rows == [{"size": "full", **row} for row in made]
