@@ -8,6 +8,15 @@ _ROUNDING = 1e-6
 """Share of u_max by which an input may be beyond its bounds."""
 
 
+def leeway(mpc: LinearMPC, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest input (m,), N, that an MPC's bounds and rate bounds allow after the one that was held (m,)."""
+    lower, upper = mpc.input_limits
+    if mpc.rate_limits is None:
+        return lower, upper
+    slowest, fastest = (held + limit * mpc.sample_time for limit in mpc.rate_limits)
+    return np.clip(slowest, lower, upper), np.clip(fastest, lower, upper)
+
+
 class Kept:
     """A pilot that is held to the bounds and rate bounds of a study's MPC, whatever its own; a pilot itself.
 
@@ -30,10 +39,7 @@ class Kept:
         u, allowed = np.asarray(self._pilot.step(y, reference, disturbance), dtype=float), self._allowed
         if u.shape != (allowed.inputs,) or not np.isfinite(u).all():
             raise ValueError(f"the controller gave {u!r} for its inputs; ({allowed.inputs},) finite numbers are needed")
-        lower, upper = allowed.input_limits
-        if allowed.rate_limits is not None:
-            slowest, fastest = (self._held + limit * allowed.sample_time for limit in allowed.rate_limits)
-            lower, upper = np.maximum(lower, np.minimum(slowest, upper)), np.minimum(upper, np.maximum(fastest, lower))
+        lower, upper = leeway(allowed, self._held)
         slack = _ROUNDING * allowed.input_scale
         if beyond := np.flatnonzero((u < lower - slack) | (u > upper + slack)).tolist():
             i = beyond[0]

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from ...model import Record
 from ...mpc import KKT_TOLERANCE, ActiveSet, ControllerInfo, LinearMPC, weight_matrix
 from ...mpc.formulation import dual_program
+from ._kept import leeway
 
 
 class Law(ABC):
@@ -51,11 +52,7 @@ class Law(ABC):
     @property
     def allowed(self) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest input (m,), N, that the bounds and the last one allow for the coming sample."""
-        lower, upper = self.mpc.input_limits
-        if self.mpc.rate_limits is None:
-            return lower, upper
-        slowest, fastest = (self.held + limit * self.mpc.sample_time for limit in self.mpc.rate_limits)
-        return np.clip(slowest, lower, upper), np.clip(fastest, lower, upper)
+        return leeway(self.mpc, self.held)
 
     def prediction_error(self, record: Record) -> float:
         """How far its model, if it has one, is off on a record from rest: root mean square distance, m."""
