@@ -5,7 +5,7 @@ from ._foresight import FORESIGHT, Foresight
 from ._kept import Kept
 from ._lab import BudgetSpent, Lab, check_lent
 from ._law import Forecast, Law, Program, looked_ahead
-from ._method import Information, Method, offers_of
+from ._method import Information, Method, Probed, offers_of
 from ._models import believed, identified, static_gain
 from ._settings import check_count, check_least
 from ._tuned import BESIDE_MODEL, tuned
@@ -22,6 +22,7 @@ __all__ = [
     "Lab",
     "Law",
     "Method",
+    "Probed",
     "Program",
     "believed",
     "check_count",

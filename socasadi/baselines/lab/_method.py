@@ -7,6 +7,7 @@ from threadpoolctl import threadpool_limits
 
 from ...campaign import Pilot
 from ._lab import BudgetSpent, Lab
+from ._settings import check_least
 
 Information = Literal["data sheet", "other robots", "plant model"]
 
@@ -64,6 +65,23 @@ class Method(ABC):
             why = lab.failures or why
             raise BudgetSpent(f"{type(self).__name__} has no controller to offer: {why}")
         return offered[-1]
+
+
+@dataclass(frozen=True)
+class Probed(Method):
+    """A method that begins with a probing record.
+
+    Parameters
+    ----------
+    probing
+        s of probing.
+    """
+
+    probing: float = 40.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_least(1, probing=self.probing)
 
 
 def offers_of(method: Method, lab: Lab) -> Iterator[Pilot]:

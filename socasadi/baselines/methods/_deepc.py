@@ -8,14 +8,14 @@ from scipy.linalg import null_space
 from ...campaign import Pilot
 from ...model import Entry, Record
 from ...mpc import LinearMPC
-from ..lab import Forecast, Lab, Law, Method, Program, check_least, looked_ahead, tuned
+from ..lab import Forecast, Lab, Law, Probed, Program, looked_ahead, tuned
 
 _LONGEST_PAST = 24
 """Samples."""
 
 
 @dataclass(frozen=True)
-class DeePC(Method):
+class DeePC(Probed):
     r"""Data-enabled predictive control: a probing record takes the place of the model.
 
     Coulson, Lygeros, Dörfler, "Data-enabled predictive control: in the shallows of the DeePC", European Control
@@ -30,18 +30,13 @@ class DeePC(Method):
 
     Parameters
     ----------
-    velocity
-        Whether the matrices hold changes from sample to sample, which leaves no steady error.
     probing
         s of probing.
+    velocity
+        Whether the matrices hold changes from sample to sample, which leaves no steady error.
     """
 
     velocity: bool = False
-    probing: float = 40.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_least(1, probing=self.probing)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         mpc = lab.study.mpc

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from ...campaign import Pilot
 from ...model import StateSpace, subspace
 from ...plant import SimulatedPlant
-from ..lab import Information, Lab, Method, check_least, identified
+from ..lab import Information, Lab, Method, Probed, identified
 
 
 @dataclass(frozen=True)
-class Identified(Method):
+class Identified(Probed):
     """The study's MPC on the model of its family that predicts a probing record best.
 
     Parameters
@@ -19,18 +19,12 @@ class Identified(Method):
         s of probing.
     """
 
-    probing: float = 40.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_least(1, probing=self.probing)
-
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         yield lab.study.mpc.controller_for(identified(lab, self.probing))
 
 
 @dataclass(frozen=True)
-class Subspace(Method):
+class Subspace(Probed):
     """The study's MPC on the model that N4SID finds in a probing record; see :func:`subspace`.
 
     Parameters
@@ -38,12 +32,6 @@ class Subspace(Method):
     probing
         s of probing.
     """
-
-    probing: float = 40.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_least(1, probing=self.probing)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         yield lab.study.mpc.controller_for(subspace(lab.probe(self.probing)))

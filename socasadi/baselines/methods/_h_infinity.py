@@ -8,7 +8,7 @@ from scipy.linalg import solve_continuous_are
 from ...campaign import Pilot
 from ...model import Entry, StateSpace, subspace
 from ...mpc import DesignError, LinearMPC
-from ..lab import FORESIGHT, Allocation, Foresight, Lab, Law, Method, check_least, static_gain, tuned
+from ..lab import FORESIGHT, Allocation, Foresight, Lab, Law, Probed, static_gain, tuned
 
 _ABOVE_LEAST = 1.1
 """gamma of the controller, as a factor on the least that there is."""
@@ -17,7 +17,7 @@ _SLOW = 1e-3
 
 
 @dataclass(frozen=True)
-class HInfinity(Method):
+class HInfinity(Probed):
     r"""H-infinity loop shaping on an identified model, behind the inverse static Jacobian (within the bounds).
 
     The plant, shaped by :math:`W = k (s + w) / s` in each channel, gets the controller that is the most robust against
@@ -31,12 +31,6 @@ class HInfinity(Method):
     probing
         s of probing.
     """
-
-    probing: float = 40.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_least(1, probing=self.probing)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         mpc, model = lab.study.mpc, subspace(lab.probe(self.probing))

@@ -7,11 +7,11 @@ import numpy as np
 from ...campaign import Pilot
 from ...model import Entry, Record
 from ...mpc import LinearMPC
-from ..lab import Forecast, Lab, Law, Method, Program, check_count, check_least, looked_ahead, tuned
+from ..lab import Forecast, Lab, Law, Probed, Program, check_count, looked_ahead, tuned
 
 
 @dataclass(frozen=True)
-class Koopman(Method):
+class Koopman(Probed):
     """MPC on a linear model of lifted outputs, fitted by extended dynamic mode decomposition (EDMD).
 
     Bruder, Gillespie, Remy, Vasudevan, "Modeling and control of soft robots using the Koopman operator and model
@@ -31,13 +31,11 @@ class Koopman(Method):
         Of the monomials of the last two samples' outputs, at most.
     """
 
-    probing: float = 40.0
     delays: int = 40
     degree: int = 3
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_least(1, probing=self.probing)
         check_count(1, degree=self.degree)
         check_count(2, delays=self.delays)
 

@@ -6,11 +6,11 @@ import numpy as np
 from ...campaign import Pilot
 from ...model import Entry, subspace
 from ...mpc import LinearMPC
-from ..lab import FORESIGHT, Allocation, Foresight, Lab, Law, Method, check_least, static_gain, tuned
+from ..lab import FORESIGHT, Allocation, Foresight, Lab, Law, Probed, static_gain, tuned
 
 
 @dataclass(frozen=True)
-class PID(Method):
+class PID(Probed):
     r"""Three terms per output through the inverse static Jacobian, which an identified model gives:
 
     .. math:: u = G^+ (f r_a + k_p e + k_i \int e\, dt + k_d \dot e_f)
@@ -23,12 +23,6 @@ class PID(Method):
     probing
         s of probing.
     """
-
-    probing: float = 40.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_least(1, probing=self.probing)
 
     def offers(self, lab: Lab) -> Iterator[Pilot]:
         allocation = Allocation(static_gain(subspace(lab.probe(self.probing))))
