@@ -23,6 +23,7 @@ def made_up(costs):
             "open_loop": None,
             "flights": 30,
             "failed": 1,
+            "broke": "Error: it does not add up" if seed == 1 else None,
         }
         for method, rows in costs.items()
         for i, row in enumerate(rows)
@@ -80,5 +81,5 @@ def test_the_table_has_a_row_for_each_task_and_method():
     summary = Summary.of(made_up({"ours": [[2.0, 4.0, np.inf]]}), ["task 0"], ["ours", "absent"])
     (row,) = summary_table(summary)
     assert (row["J"], row["RMSE / mm"], row["open loop / mm"]) == ("4", "1", "-")
-    assert (row["failed"], row["while tuned"], row["seeds"]) == ("1 of 3", "3 of 90", "3")
+    assert (row["failed"], row["while tuned"], row["seeds"], row["broke"]) == ("1 of 3", "3 of 90", "3", "1 of 3")
     assert (row["step p50 / us"], row["p99 / us"], row["max / us"]) == ("11", "21", "32")
