@@ -74,8 +74,6 @@ def compare(
     flown = {cell[kind] for cell in cells for kind in ("task", "method")}
     summary = Summary.of(cells, *([name for name in names if name in flown] for names in (whole.tasks, whole.methods)))
     rows = summary_table(summary)
-    for old in (*folder.glob("against.csv"), *folder.glob("elsewhere-*.csv"), *folder.glob("figures/*.p[dn][fg]")):
-        old.unlink()  # of another part, perhaps
     hidden = ("task", "knows", "seeds", "p99 / us", "while tuned", "broke")  # which the file has
     for task in summary.tasks:
         shown = [{k: v for k, v in row.items() if k not in hidden} for row in rows if row["task"] == task]
@@ -94,6 +92,10 @@ def compare(
     drawn = save_figures(comparison_figures(summary, full, size), folder / "figures")
     for file in (*files, *drawn):
         out.print(str(file))
+    for old in (folder / "against.csv", *folder.glob("elsewhere-*.csv"), *folder.glob("figures/elsewhere*.p[dn][fg]")):
+        if old not in (*files, *drawn):  # of the comparison as it was
+            old.unlink(missing_ok=True)
+    cells = fitting_cells(part, folder)
     for cell in cells:
         if cell["broke"]:
             out.print(f"broke off: {_line(cell)}")
@@ -101,8 +103,8 @@ def compare(
             out.print(_line(cell))
         elif why := next((point["failure"] for point in cell["points"] if point and point["failure"]), None):
             out.print(f"failed: {cell['task']}, {cell['method']}, seed {cell['seed']}: {why}")
-        elif held := sum(point["fallbacks"] for point in cell["points"][-1:] if point):
-            out.print(f"held its last input in {held} samples: {_line(cell)}")
+        elif missed := sum(point["fallbacks"] for point in cell["points"][-1:] if point):
+            out.print(f"no answer of its own in {missed} samples: {_line(cell)}")
     if any(cell["broke"] for cell in cells):
         raise typer.Exit(1)
 

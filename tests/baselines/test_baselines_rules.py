@@ -76,6 +76,18 @@ def test_rates_are_kept_as_well():
     assert "asks for 8 N of input 1, for which the study's bounds leave -1 to 1 N" in str(flown.failure)
     assert worth(made, made.mpc.controller(THETA), 1)[0].failure is None
 
+    class Reusing(Sudden):
+        """Its inputs come in the same array every time."""
+
+        array, sign = np.zeros(3), 1.0
+
+        def step(self, y, reference, disturbance=None):
+            self.sign = -self.sign
+            self.array[:] = self.sign * 0.9
+            return self.array
+
+    assert "asks for 0.9 N of input 1" in str(worth(made, Reusing(made.mpc), 1)[0].failure)
+
 
 def test_what_is_no_generator_or_of_another_sample_time_is_told_as_that():
     @dataclass(frozen=True)

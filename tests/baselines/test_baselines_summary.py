@@ -83,3 +83,14 @@ def test_the_table_has_a_row_for_each_task_and_method():
     assert (row["J"], row["RMSE / mm"], row["open loop / mm"]) == ("4", "1", "-")
     assert (row["failed"], row["while tuned"], row["seeds"], row["broke"]) == ("1 of 3", "3 of 90", "3", "1 of 3")
     assert (row["step p50 / us"], row["p99 / us"], row["max / us"]) == ("11", "21", "32")
+
+
+def test_a_seed_on_which_neither_has_a_controller_for_one_task_counts_with_the_others():
+    """The rival always has half the J, where there is any."""
+    ours = np.exp(np.random.default_rng(0).standard_normal((3, 8)))
+    ours[np.arange(8) % 3, np.arange(8)] = np.inf
+    cells = made_up({"ours": ours, "theirs": 0.5 * ours})
+    told = Summary.of(cells, [f"task {i}" for i in range(3)], ["ours", "theirs"]).rivalries()["theirs"]
+    assert (told.won, told.tasks) == (0, 3)
+    assert told.excess == pytest.approx((-0.5, -0.5, -0.5))
+    assert told.p == pytest.approx(2 / 2**8)

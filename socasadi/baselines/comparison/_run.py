@@ -111,7 +111,9 @@ def run_comparison(
                         raise RunError(f"{name}: its workers die ({error})") from error
                     send(names)
                 except ModuleNotFoundError as error:
-                    raise RunError(f"{name}: {error}; or leave the method out. What was done is stored") from error
+                    raise RunError(
+                        f"{name}: {error}. Install it, or leave the method out; what was done is stored"
+                    ) from error
                 except Exception as error:
                     raise RunError(f"{name}: {error}") from error
                 else:

@@ -22,9 +22,10 @@ class Rivalry:
     Attributes
     ----------
     won, tasks
-        Tasks on which its median over the seeds that both have is no higher, of those that have such seeds.
+        Tasks on which its median over the seeds that both have flown is no higher, of those on which either has a J.
     excess
-        By what share the other's J is higher: quartiles over the seeds of the geometric mean over the tasks.
+        By what share the other's J is higher: quartiles over the seeds of the geometric mean over the tasks, without
+        those on which neither has a J.
     p
         Of there being no difference: Wilcoxon's signed-rank test on that mean, one number a seed (tasks of one seed
         share noise and probing record, and do not count as several), corrected for the number of rivals after Holm;
@@ -108,14 +109,15 @@ class Summary:
                 for name in (first, method)
                 for values in [self.values(task, name, "J", checkpoint)]
             )
-            both = [seed for seed in ours if seed in theirs and np.isfinite(min(ours[seed], theirs[seed]))]
-            if not both:
+            if not (both := [seed for seed in ours if seed in theirs]):
                 continue
-            tasks += 1
-            won += bool(np.median([ours[s] for s in both]) <= np.median([theirs[s] for s in both]))
             quotients.append({seed: _log_quotient(theirs[seed], ours[seed]) for seed in both})
+            if np.isfinite(list(quotients[-1].values())).any():
+                tasks += 1
+                won += bool(np.median([ours[s] for s in both]) <= np.median([theirs[s] for s in both]))
         seeds = [seed for seed in (quotients[0] if quotients else ()) if all(seed in row for row in quotients)]
-        means = np.array([np.mean([row[seed] for row in quotients]) for seed in seeds])
+        of_seeds = np.array([[row[seed] for row in quotients] for seed in seeds]).reshape(len(seeds), -1)
+        means = np.array([np.nanmean(row) for row in of_seeds if np.isfinite(row).any()])
         tested = len(means) >= _FEWEST and np.any(means)
         p = float(wilcoxon(means)[1]) if tested else np.nan  # pyright: ignore[reportArgumentType]
         low, middle, high = np.expm1(_quartiles(means)).tolist()
@@ -149,8 +151,8 @@ def _quartiles(values: np.ndarray) -> tuple[float, float, float]:
 
 
 def _log_quotient(a: float, b: float) -> float:
-    """Of two J, within bounds where one of them is infinite."""
-    return float(np.clip(np.log(a) - np.log(b), -50, 50))
+    """Of two J, within bounds where one of them is infinite; NaN where both are."""
+    return np.nan if np.isinf(a) and np.isinf(b) else float(np.clip(np.log(a) - np.log(b), -50, 50))
 
 
 def summary_table(summary: Summary, checkpoint: int = -1) -> list[dict[str, str]]:

@@ -36,7 +36,8 @@ class Kept:
         self._held = np.broadcast_to(np.asarray(u_prev, dtype=float), (self._allowed.inputs,))
 
     def step(self, y: ArrayLike, reference: ArrayLike, disturbance: ArrayLike | None = None) -> np.ndarray:
-        u, allowed = np.asarray(self._pilot.step(y, reference, disturbance), dtype=float), self._allowed
+        # A pilot may use its array again.
+        u, allowed = np.array(self._pilot.step(y, reference, disturbance), dtype=float), self._allowed
         if u.shape != (allowed.inputs,) or not np.isfinite(u).all():
             raise ValueError(f"the controller gave {u!r} for its inputs; ({allowed.inputs},) finite numbers are needed")
         lower, upper = leeway(allowed, self._held)
