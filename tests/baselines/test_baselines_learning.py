@@ -36,26 +36,29 @@ def test_learning_from_flight_to_flight_lowers_the_cost_where_nothing_else_chang
     assert costs[-1] < 0.95 * costs[1]
 
 
+@pytest.mark.parametrize("preview", [1, None, 60])
 @pytest.mark.parametrize("doubt", [1.0, 1e-4])
-def test_learning_knows_how_the_loop_answers_however_slowly_it_settles(doubt):
+def test_learning_knows_how_the_loop_answers_however_far_it_sees_and_slowly_it_settles(doubt, preview):
     """By a flight on the model itself with and without a shift; little is corrected if the observer doubts nothing."""
-    mpc = replace(study(preview=1).mpc, tuned=("input_noise", "disturbance_noise"))
-    controller, count, when = mpc.controller([*THETA, doubt, doubt]), 600, 20
+    mpc = replace(study(preview=preview, horizon=preview or 10).mpc, tuned=("input_noise", "disturbance_noise"))
+    controller, count = mpc.controller([*THETA, doubt, doubt]), 400
     model = believed(controller)
     answers = _learning._responses(model, count) @ _learning._answers(controller, model, count)
-    flown = []
-    for size in (0.0, 1e-4):
+    flown = {}
+    for when in (None, 70, count - 1):
         shift, plant, outputs = np.zeros((count, 2)), LinearPlant(), []
-        shift[when, 0] = size
+        if when is not None:
+            shift[when, 0] = 1e-4
         pilot = _learning._Shifted(controller, shift)
         pilot.reset()
         y = plant.reset()
         for _ in range(count):
-            y = plant.step(pilot.step(y, np.zeros((1, 2))))
+            y = plant.step(pilot.step(y, np.zeros((mpc.reference_rows, 2))))
             outputs.append(y)
-        flown.append(outputs)
-    measured = np.ravel(np.subtract(flown[1], flown[0])) / 1e-4
-    np.testing.assert_allclose(answers[:, 2 * when], measured, atol=1e-3 * np.abs(measured).max())
+        flown[when] = np.ravel(outputs)
+    for when in (70, count - 1):
+        measured = (flown[when] - flown[None]) / 1e-4
+        np.testing.assert_allclose(answers[:, 2 * when], measured, atol=1e-3 * np.abs(measured).max())
 
 
 def test_learning_averages_the_noise_of_the_sensor_out():

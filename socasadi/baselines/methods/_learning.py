@@ -1,6 +1,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import count as count_from
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,8 +13,8 @@ from ...mpc import Controller, ControllerInfo, weight_matrix
 from ..lab import Lab, Method, believed, check_least
 from ._weights import WeightSearch
 
-_BEFORE, _AFTER = 40, 200
-"""Samples before and after a change of the reference in which the loop answers to it."""
+_AFTER = 200
+"""Samples after a change of the reference in which inputs answer to it."""
 
 
 @dataclass(frozen=True)
@@ -112,20 +113,20 @@ def _answers(controller: Controller, model: StateSpace, count: int) -> np.ndarra
     """How inputs (count m), N, answer to a shift (count p) in the loop with the model, while no bound is active."""
     (A, B, C, D), mpc = model, controller.mpc
     p, m, size = mpc.outputs, mpc.inputs, 1e-3 * min(mpc.largest_output_bound, 1.0)
-    to_u = np.zeros((count, m, count, p))
-    for i in range(p):
-        shift, u = np.zeros((_BEFORE + _AFTER, p)), np.zeros((_BEFORE + _AFTER, m))
-        shift[_BEFORE, i] = size
+    # The loop looks ahead, so that it answers before a shift comes; the last one is held for as long as it looks.
+    to_u, ahead = np.zeros((count, m, count, p)), mpc.reference_rows
+    for i, last in product(range(p), (False, True)):
+        shift, u = np.zeros((ahead + _AFTER, p)), np.zeros((ahead + _AFTER, m))
+        shift[ahead : None if last else ahead + 1, i] = size
         pilot, x, y = _Shifted(controller, shift), np.zeros(len(A)), np.zeros(p)
         pilot.reset()
         for k in range(len(shift)):
             u[k] = pilot.step(y, np.zeros((mpc.reference_rows, p)))
             x = A @ x + B @ u[k]
             y = C @ x + D @ u[k]
-        for k in range(count):
-            # The loop looks ahead, so that it answers before the shift comes.
-            rows = np.arange(max(k - _BEFORE, 0), min(k + _AFTER, count))
-            to_u[rows, :, k, i] = u[rows - k + _BEFORE] / size
+        for k in range(count - 1, count) if last else range(count - 1):
+            rows = np.arange(max(k - ahead, 0), min(k + _AFTER, count))
+            to_u[rows, :, k, i] = u[rows - k + ahead] / size
     return to_u.reshape(count * m, count * p)
 
 
