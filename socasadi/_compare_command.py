@@ -136,10 +136,11 @@ def _rivals(summary: Any) -> list[dict[str, str]]:
         for method, rivalry in summary.rivalries(at).items():
             knows = next(c["information"] for task in summary.tasks for c in summary.of_pair(task, method))
             low, middle, high = (f"{100 * share:+.1f}" if share < 10 else "far" for share in rivalry.excess)
+            higher = "-" if np.isnan(rivalry.excess[1]) else f"{middle} ({low} to {high})"
             rows.setdefault(method, {"method": method, "knows": knows})
             rows[method] |= {
                 f"{summary.methods[0]} at or below, at {points}": f"{rivalry.won} of {rivalry.tasks}",
-                f"higher by %, at {points}": f"{middle} ({low} to {high})",
+                f"higher by %, at {points}": higher,
                 f"p, at {points}": f"{rivalry.p:.2g}" if np.isfinite(rivalry.p) else "-",
             }
     return list(rows.values())

@@ -129,14 +129,50 @@ def test_what_is_there_is_told_first_what_broke_at_last_and_nothing_stays_of_a_c
     assert done.returncode == 1
     assert "broke off: circle, broken, seed 0: ZeroDivisionError: division by zero (script.py, line 7)" in done.stdout
     assert "are there" not in done.stdout
-    assert (folder / "against.csv").exists()
+    old = [folder / name for name in ("against.csv", "elsewhere-old.csv", "figures/elsewhere-old.png")]
+    kept = [folder / name for name in ("notes.csv", "figures/mine.png")]
+    for file in (*old[1:], *kept):
+        file.touch()
+    assert old[0].exists()
     with (folder / "table.csv").open() as file:
         assert [row["broke"] for row in csv.DictReader(file)] == ["0 of 1", "1 of 1"]
     script.write_text(BROKEN.replace(', "broken": Broken()', ""))
     again = compare("script.py", "--jobs", "1", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
     assert "1 of 1 cells are there; 1 that were flown under other settings are left aside" in again.stdout
-    assert not (folder / "against.csv").exists()
+    assert [file.exists() for file in (*old, *kept)] == [False, False, False, True, True]
+
+
+SILENT = """
+import numpy as np
+from socasadi import Circle, LinearMPC, Modal, Rod, SimulatedPlant, Study
+from socasadi.baselines import Comparison, Law, Method
+
+class Late(Law):
+    def begin(self):
+        self.left = 3
+
+    def act(self, y, reference):
+        self.left -= 1
+        return np.full(self.mpc.inputs, np.nan if self.left >= 0 else 1.0)
+
+class Silent(Method):
+    def offers(self, lab):
+        yield Late(lab.study.mpc)
+
+study = Study(plant=SimulatedPlant(Rod.preset("paper")), mpc=LinearMPC(Modal()), task=Circle(duration=1.0))
+comparison = Comparison(
+    study=study, tasks={"circle": study.task}, methods={"silent": Silent()}, seeds=(0,), checkpoints=(1,), flights=2
+)
+"""
+
+
+def test_how_often_a_controller_had_no_answer_is_told(tmp_path):
+    """Three samples in each of two flights."""
+    (tmp_path / "script.py").write_text(SILENT)
+    done = compare("script.py", "--jobs", "1", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "no answer of its own in 6 samples: circle, silent, seed 0: J = " in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -65,6 +65,16 @@ def test_only_seeds_that_both_have_flown_are_compared_and_a_failure_is_far_behin
     assert both.excess[1] == pytest.approx(0.1)
 
 
+def test_methods_that_share_no_seed_on_all_tasks_are_not_compared_over_them():
+    """The first task is flown with seed 0, the second with seed 1."""
+    flown = [
+        c for c in made_up({"ours": np.ones((2, 2)), "theirs": np.ones((2, 2))}) if c["task"][-1] == str(c["seed"])
+    ]
+    told = Summary.of(flown, ["task 0", "task 1"], ["ours", "theirs"]).rivalries()["theirs"]
+    assert (told.won, told.tasks) == (2, 2)
+    assert np.isnan([*told.excess, told.p]).all()
+
+
 def test_quartiles_over_ten_seeds_are_those_of_numpy_and_failures_are_infinite():
     costs = [list(range(1, 11)), [1.0] * 4 + [np.inf] * 6]
     summary = Summary.of(made_up({"ours": costs}), ["task 0", "task 1"], ["ours"])

@@ -25,7 +25,7 @@ class Rivalry:
         Tasks on which its median over the seeds that both have flown is no higher, of those on which either has a J.
     excess
         By what share the other's J is higher: quartiles over the seeds of the geometric mean over the tasks, without
-        those on which neither has a J.
+        those on which neither has a J; NaN without a seed that both have flown on all tasks.
     p
         Of there being no difference: Wilcoxon's signed-rank test on that mean, one number a seed (tasks of one seed
         share noise and probing record, and do not count as several), corrected for the number of rivals after Holm;
@@ -116,7 +116,7 @@ class Summary:
                 tasks += 1
                 won += bool(np.median([ours[s] for s in both]) <= np.median([theirs[s] for s in both]))
         seeds = [seed for seed in (quotients[0] if quotients else ()) if all(seed in row for row in quotients)]
-        of_seeds = np.array([[row[seed] for row in quotients] for seed in seeds]).reshape(len(seeds), -1)
+        of_seeds = np.array([[row[seed] for row in quotients] for seed in seeds]).reshape(len(seeds), len(quotients))
         means = np.array([np.nanmean(row) for row in of_seeds if np.isfinite(row).any()])
         tested = len(means) >= _FEWEST and np.any(means)
         p = float(wilcoxon(means)[1]) if tested else np.nan  # pyright: ignore[reportArgumentType]
@@ -142,9 +142,9 @@ def _median(value: Any) -> float:
 
 
 def _quartiles(values: np.ndarray) -> tuple[float, float, float]:
-    """Of values that may be infinite."""
+    """Of values that may be infinite; NaN of none."""
     if not len(values):
-        return (np.inf, np.inf, np.inf)
+        return (np.nan, np.nan, np.nan)
     parts = np.quantile(np.minimum(values, _HUGE), (0.25, 0.5, 0.75))
     low, middle, high = np.where(parts > _HUGE / 1e10, np.inf, parts).tolist()
     return low, middle, high
