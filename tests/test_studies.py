@@ -70,3 +70,18 @@ def test_paper_tables_hold_what_the_runs_hold(smoke):
         assert float(row["verified_J"]) == pytest.approx(flown[0], rel=1e-3)
         assert all(value in words for value in row.values())
     assert "evaluation 42" in words
+
+
+@pytest.mark.slow
+def test_what_is_tuned_where_nothing_pushes_pays_for_it_where_something_does(tmp_path):
+    """Each row of the table: J undisturbed, of a softer arm, pushed, and of a softer one that is pushed."""
+    command = [sys.executable, str(STUDIES / "probed_arm.py")]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=300)
+    assert done.returncode == 0, done.stderr
+    rows = [line.split() for line in done.stdout.splitlines()[-4:]]
+    J = {name: np.array(costs, dtype=float) for name, *costs in rows}
+    assert list(J) == ["untuned", "tuned", "tuned-doubting", "tuned-pushed"]
+    assert J["tuned"][0] < J["tuned-doubting"][0] < 0.97 * J["untuned"][0]
+    assert np.all(2 * J["untuned"][1:] < J["tuned"][1:])
+    for name in ("tuned-doubting", "tuned-pushed"):
+        assert np.all(J[name] < 1.5 * J["untuned"])
