@@ -1,4 +1,4 @@
-"""Would you have got there without Bayesian optimisation: twenty-two ways to a controller at equal cost.
+"""Would you have got there without Bayesian optimisation: twenty-three ways to a controller at equal cost.
 
     socasadi compare studies/compare.py --smoke       does it work: under two minutes
     socasadi compare studies/compare.py --quick       three seeds, 30 episodes' worth of the robot's time
@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from circle import study as circle
 
-from socasadi import Circle, FigureEight, Origin, Rod, SetPoints, SimulatedPlant
+from socasadi import Circle, FigureEight, Origin, Pulse, Rod, SetPoints, SimulatedPlant
 from socasadi.baselines import (
     PID,
     Comparison,
@@ -39,6 +39,7 @@ from socasadi.rod import Payload
 
 study = replace(circle, mpc=replace(circle.mpc, horizon=20))
 loaded = SimulatedPlant(replace(Rod.preset("paper"), payloads=Payload(0.1)), sample_time=0.05, noise=1e-3)
+push = Pulse(time=8.0, duration=4.0, force=(0.0, 0.1, 0.1))  # moves the tip by 15 mm, if nothing is done
 stairs = ((0.02, 0.0), (0.04, 0.0), (0.06, 0.0), (0.03, 0.03))
 
 # Robots beside its own for which a controller is tuned as well, where it is tuned for robustness: none of those on
@@ -58,6 +59,7 @@ comparison = Comparison(
         "stairs": SetPoints(points=stairs, hold=5.0),
         "80 mm": SetPoints(points=((0.08, 0.0),)),
         "payload": replace(study, plant=loaded),
+        "pushed": Circle(radius=0.05, period=20.0, pulse=push),
     },
     methods={
         "socasadi": WeightSearch(flights=3),
@@ -78,6 +80,7 @@ comparison = Comparison(
         "DeePC": DeePC(),
         "velocity DeePC": DeePC(velocity=True),
         "ILC": IterativeLearning(),
+        "ILC (untuned)": IterativeLearning(Subspace()),
         "linearised": Linearised(),
         "linearised (tuned)": WeightSearch("linearised"),
         "nonlinear MPC": NonlinearMPC(),
@@ -95,6 +98,6 @@ comparison = Comparison(
         "friction 0.3": Rubbing(0.3),
         "1 sample late": Delayed(1),
     },
-    elsewhere_on=("circle",),
+    elsewhere_on=("circle", "pushed"),
     shown=("socasadi", "model search", "N4SID", "PID", "H-infinity", "Koopman", "DeePC", "nonlinear MPC"),
 )

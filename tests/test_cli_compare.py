@@ -34,7 +34,7 @@ def compare(*arguments, cwd, alone=False):
 WHOLE = load_comparison(ROOT / "studies" / "compare.py", "smoke")
 ALIKE = {
     *("socasadi (Sobol)", "socasadi (random)", "socasadi (careful)", "for the mean", "Sobol", "random", "weights"),
-    *("velocity DeePC", "linearised", "linearised (tuned)", "nonlinear MPC"),
+    *("velocity DeePC", "ILC (untuned)", "linearised", "linearised (tuned)", "nonlinear MPC"),
 }
 """Methods that others share their code with."""
 FEW = (["circle"], [method for method in WHOLE.methods if method not in ALIKE])
