@@ -161,6 +161,7 @@ def _methods(summary: Summary, shown: Sequence[str], note: str) -> Figure:
         ours = float(np.median(summary.values(task, summary.methods[0], "J")))
         if not np.isfinite(ours):
             continue  # nothing to compare with
+        least = 1.0
         for row, method in zip(rows, summary.methods, strict=True):
             if not summary.of_pair(task, method):
                 continue
@@ -171,10 +172,11 @@ def _methods(summary: Summary, shown: Sequence[str], note: str) -> Figure:
                 told = f"{middle:.3g} times" if np.isfinite(middle) else "failed"
                 place.annotate(told, (_HIGHEST, row), ha="right", va="center", fontsize=6)
                 continue
+            least = min(least, low)
             place.plot([low, min(high, _HIGHEST)], [row, row], color=colour, lw=1.2)
             place.plot(middle, row, marker or ".", color=colour, ms=4 if marker else 6)
         place.axvline(1.0, color=GREY, lw=0.6, ls=":")
-        place.set(xscale="log", xlim=(0.8, _HIGHEST), ylim=(-0.7, len(rows) - 0.3))
+        place.set(xscale="log", xlim=(min(0.8, 0.95 * least), _HIGHEST), ylim=(-0.7, len(rows) - 0.3))
         _plain_log(place.xaxis, (1, 1.5, 2, 3))
     figure.supxlabel(
         f"J after {summary.checkpoints[-1]} episodes' worth of time, as a multiple of that of {summary.methods[0]}",

@@ -46,6 +46,16 @@ def test_figures_pick_out_what_the_script_says_and_mark_nothing_above_their_scal
     assert any(line.get_ydata()[0] == top for line in place.lines)
 
 
+def test_a_method_that_is_far_better_than_the_first_is_in_the_picture():
+    made = comparison(methods={"good": Good(), "better": Better()}, checkpoints=(1,), flights=1)
+    cells = [fly_cell(made, *names) for names in made.cells]
+    for cell, J in zip(cells, (1.0, 0.2), strict=True):
+        cell["points"][-1]["J"] = [J]
+    drawn = comparison_figures(Summary.of(cells, ["circle"], ["good", "better"]), made, "full")["methods"]
+    (place,) = (axes for axes in drawn.axes if axes.get_visible())
+    assert place.get_xlim()[0] < 0.2
+
+
 def test_distances_are_from_the_reference_and_averaged_over_a_second():
     made = comparison(methods={"good": Good()}, checkpoints=(1,), flights=1)
     cell = fly_cell(made, "circle", "good", 0)
