@@ -12,7 +12,7 @@ from ...campaign import Pilot, Stream, Study, drawn_seed, fly_once, probe
 from ...model import state_space_error
 from ...mpc import Controller, ControllerInfo, LinearMPC
 from ...plant import Plant
-from ..lab import Kept, believed
+from ..lab import Bounded, believed
 
 Elsewhere = Mapping[str, Callable[[Plant], Plant]]
 """Other robots by name: each made of a study's own."""
@@ -61,7 +61,7 @@ def worth(study: Study, pilot: Pilot, flights: int) -> tuple[Worth, np.ndarray]:
     J, rmse, told, fallbacks, path = [], [], [], 0, np.zeros((0, study.mpc.outputs))
     failure = None
     for i in range(1, flights + 1):
-        episode = fly_once(study, Kept(timed, study.mpc), (Stream.VERIFICATION, i))
+        episode = fly_once(study, Bounded(timed, study.mpc), (Stream.VERIFICATION, i))
         fallbacks += episode.fallbacks
         if i == 1:
             path = episode.truth

@@ -1,8 +1,8 @@
 """What every method is given: a robot for a time, a search for its own numbers, a law that keeps the bounds."""
 
 from ._allocation import Allocation
+from ._bounded import Bounded
 from ._foresight import FORESIGHT, Foresight
-from ._kept import Kept
 from ._lab import BudgetSpent, Lab, check_lent
 from ._law import Forecast, Law, Program, looked_ahead
 from ._method import Information, Method, Probed, offers_of
@@ -14,11 +14,11 @@ __all__ = [
     "BESIDE_MODEL",
     "FORESIGHT",
     "Allocation",
+    "Bounded",
     "BudgetSpent",
     "Forecast",
     "Foresight",
     "Information",
-    "Kept",
     "Lab",
     "Law",
     "Method",

@@ -6,7 +6,7 @@ import numpy as np
 from ...campaign import Episode, Pilot, Stream, Study, Task, drawn_seed, fly_once, probe
 from ...model import Record
 from ...plant import Plant
-from ._kept import Kept
+from ._bounded import Bounded
 
 _ROUNDING = 1e-9
 
@@ -121,7 +121,7 @@ class Lab:
         self.flights += 1
         number = self.numbered + 1 if number is None else number
         self.numbered = max(self.numbered, number)
-        episode = fly_once(study, Kept(pilot, study.mpc), (Stream.TRIAL, number), give_up)
+        episode = fly_once(study, Bounded(pilot, study.mpc), (Stream.TRIAL, number), give_up)
         # Where not even the first sample came, the robot was occupied all the same.
         self.spent += max(len(episode.tension), 1) * episode.sample_time
         self.failed += episode.failure is not None

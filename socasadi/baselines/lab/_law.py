@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from ...model import Record
 from ...mpc import KKT_TOLERANCE, ActiveSet, ControllerInfo, LinearMPC, weight_matrix
 from ...mpc.formulation import dual_program
-from ._kept import leeway
+from ._bounded import leeway
 
 
 class Law(ABC):

@@ -124,7 +124,7 @@ def _answers(controller: Controller, model: StateSpace, count: int) -> np.ndarra
             u[k] = pilot.step(y, np.zeros((mpc.reference_rows, p)))
             x = A @ x + B @ u[k]
             y = C @ x + D @ u[k]
-        for k in range(count - 1, count) if last else range(count - 1):
+        for k in [count - 1] if last else range(count - 1):
             rows = np.arange(max(k - ahead, 0), min(k + _AFTER, count))
             to_u[rows, :, k, i] = u[rows - k + ahead] / size
     return to_u.reshape(count * m, count * p)

@@ -17,7 +17,7 @@ def leeway(mpc: LinearMPC, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.clip(slowest, lower, upper), np.clip(fastest, lower, upper)
 
 
-class Kept:
+class Bounded:
     """A pilot that is held to the bounds and rate bounds of a study's MPC, whatever its own; a pilot itself.
 
     An input that leaves them, or is none, is a ValueError, which ends a flight as failed.
